@@ -77,7 +77,7 @@ FeedbackMonitor::Problem FeedbackMonitor::Find(const drive_feedback_t& feedback)
 int FeedbackMonitor::FindJump(const drive_feedback_t& feedback) const {
   if (!consecutive_ || config_.velocity_limit.empty()) return -1;
   for (size_t j = 0; j < counts_.size(); ++j) {
-    // As doubles: the difference of two 64-bit counts may not fit 64 bits.
+    // Doubles are subtracted: the difference of two 64-bit counts may not fit 64 bits.
     const double change =
         static_cast<double>(feedback.position_counts[j]) - static_cast<double>(counts_[j]);
     const double most = kVelocityMargin * config_.velocity_limit[j] * config_.period;

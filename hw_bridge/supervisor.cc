@@ -427,7 +427,7 @@ Impedance Supervisor::WantedImpedance(size_t joint, int8_t* limits) const {
     default:
       break;
   }
-  // No more than the current can take back.
+  // A drive's stiffness and damping give no more torque than its current can take back.
   result.LimitTorque(Position(joint), monitor_.updated() ? joint_velocity()[joint] : 0,
                      config_.torque_limit[joint]);
   return result;

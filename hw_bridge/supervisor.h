@@ -54,7 +54,7 @@ class Supervisor {
   /// s that this cycle began after its time; counts overruns and stops after too many.
   void CountLateness(double lateness);
 
-  /// By operator or signal (REASON_*), latched.
+  /// Stops and stays so, for an operator or a signal (REASON_*).
   void EmergencyStop(int8_t reason = bridge_status_t::REASON_OPERATOR) {
     Latch(bridge_status_t::STATE_ESTOP, reason);
   }
@@ -124,7 +124,7 @@ class Supervisor {
   int stop_ramp_cycles_, first_ramp_cycles_, resume_cycles_;
   int hold_cycles_;                      // between the last command's end and damping
   std::vector<double> torque_;           // N·m, last accepted command
-  std::vector<Impedance> impedance_;     // likewise
+  std::vector<Impedance> impedance_;     // of the same command
   std::vector<double> current_;          // A, that the drives give as of the last reading
   std::vector<double> applied_;          // N·m, of the cycle before
   std::vector<double> hold_torque_;      // N·m

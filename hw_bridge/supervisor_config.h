@@ -19,8 +19,8 @@ struct SupervisorConfig {
   /// rad, by joint; empty: not limited.
   std::vector<double> lower, upper;
   std::vector<double> velocity_limit;  ///< rad/s, by joint; empty: no speed or jump is too large
-  /// Of the robot, or as the settings give them. Empty stiffness_limit and damping_limit: a
-  /// command's are not limited.
+  /// The robot's thresholds, or those that the settings give. Where stiffness_limit and
+  /// damping_limit are empty, those of a command are not limited.
   RobotThresholds thresholds;
   Eigen::Vector3d upright = Eigen::Vector3d::UnitZ();  ///< up in the IMU's frame when standing
   int num_feet = 2;

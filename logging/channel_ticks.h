@@ -57,7 +57,7 @@ class ChannelTicks {
   int64_t newest() const { return newest_; }  ///< -1: none
   int64_t refused() const { return completeness_.refused; }
   const std::string& name() const { return completeness_.name; }
-  /// With what ticks [first, end) lack.
+  /// What is known of the channel, with what ticks [first, end) lack.
   ChannelCompleteness Completeness(int64_t first, int64_t end) const;
   std::vector<TickRange> Missing(int64_t first, int64_t end) const;
 

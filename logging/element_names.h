@@ -20,7 +20,7 @@ class ElementNames {
   /// Joints and motors in the order of the robot's joints, feet by the names in its file. A name
   /// that a path could not hold (".[]", spaces, digits alone, ...) is not used.
   explicit ElementNames(const robot::RobotModel& robot);
-  /// Those of a run's robot; none when its texts cannot be read.
+  /// The names of a run's robot; none when its texts cannot be read.
   static ElementNames OfTexts(std::string_view robot_text, std::string_view urdf_xml);
   static ElementNames OfSpec(const RunSpec& spec);
 
@@ -33,7 +33,7 @@ class ElementNames {
   std::string Joint(int index) const;
 
  private:
-  /// By the count that sizes the array.
+  /// Names by the count that sizes their array.
   std::map<std::string, std::vector<std::string>, std::less<>> names_;
   std::map<std::string, std::string, std::less<>> foot_of_link_;
 };

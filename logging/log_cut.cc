@@ -64,7 +64,7 @@ CutResult CutLog(const std::string& from, const CutRange& range, const std::stri
   if (!survey.info_problem.empty()) throw LogError(survey.info_problem);
   RunSpec spec = survey.spec;
   *spec.mutable_cut() = MakeCut(survey, range, from);
-  // Never truncates a log that someone reads, this one least of all.
+  // No log that someone reads is truncated, this one least of all.
   if (std::filesystem::exists(to)) {
     throw LogError(fmt::format("{}: exists; choose another name or remove it", to));
   }

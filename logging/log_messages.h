@@ -24,7 +24,7 @@ class LogMessages {
   bool run_known() const { return run_known_; }
   const RunSpec& spec() const { return run_.spec; }
   const run_info_t& info() const { return run_.info; }
-  /// Those of the run's robot.
+  /// The names of the run's robot.
   const ElementNames& names() const { return names_; }
   /// A path in a message of this channel, elements by their names.
   std::string Label(std::string_view channel, std::string_view path) const;

@@ -134,7 +134,7 @@ bool LogReader::Next(LogEvent* event) {
   size_t end = 0;
   const size_t begin = position_;
   while (position_ < size_ && !ParseAt(position_, event, &end)) {
-    // On to the next magic; memmem is much faster than a look at every byte.
+    // Reading goes on at the next magic; memmem is much faster than a look at every byte.
     const void* const next =
         memmem(data_ + position_ + 1, size_ - position_ - 1, kMagicBytes, sizeof(kMagicBytes));
     position_ =
@@ -153,7 +153,7 @@ bool LogReader::Next(LogEvent* event) {
 }
 
 void LogReader::LetGo() {
-  // Who still looks there finds it again: the system reads the file once more.
+  // Whoever still looks at these bytes finds them again: the system reads the file once more.
   const size_t until = (position_ - kHeldBytes) & ~(kHeldBytes - 1);
   madvise(const_cast<uint8_t*>(data_) + released_, until - released_, MADV_DONTNEED);
   released_ = until;

@@ -31,7 +31,8 @@ class PagedFile {
     Visit(offset);
     return data_ + offset;
   }
-  /// Where `bytes` stand now, at the end of a scratch file. Throws LogError: the disk is full.
+  /// Appends `bytes` to a scratch file and returns where they stand. Throws LogError: the disk is
+  /// full.
   uint64_t Append(std::span<const uint8_t> bytes);
   /// A scratch file's new size; new bytes are 0. Throws LogError.
   void Resize(uint64_t size);

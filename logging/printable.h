@@ -12,7 +12,7 @@ std::string Printable(std::string_view text, std::string_view quote = "\\\"");
 
 /// Text as it is when it is UTF-8 without control characters, else as Printable, quotes kept.
 std::string ForTerminal(std::string_view text);
-/// The same line by line.
+/// ForTerminal of each line by itself.
 std::string LinesForTerminal(std::string_view text);
 
 bool IsUtf8(std::string_view text);

@@ -89,7 +89,8 @@ struct RunRecord {
   Series<external_push_t> push;
   Series<ground_truth_t> truth;
   std::map<std::string, health_t> health;  ///< by component: its last
-  /// To an operator's acts, as they stand in the log: whole, of this run, perhaps said twice.
+  /// Answers to an operator's acts, as they stand in the log: whole, of this run, perhaps said
+  /// twice.
   std::vector<operate::answer_t> answers;
 
   std::vector<ChannelCompleteness> channels;  ///< not the external ones
@@ -100,7 +101,7 @@ struct RunRecord {
   /// The run of the scenario's reference variant, for metrics that compare with it; nullptr when
   /// there is none. Not in the log, set by who reads both.
   std::shared_ptr<RunRecord> reference;
-  /// By estimator_status_t::METHOD_*: estimates of the methods that did not run; nullptr for what
+  /// Estimates of the methods that did not run, by estimator_status_t::METHOD_*; nullptr for what
   /// nobody has asked for. Not in the log, set by who can run the estimator.
   std::array<std::shared_ptr<const Estimates>, 2> other_estimates;
 

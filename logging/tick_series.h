@@ -28,7 +28,7 @@ class Series {
   void Set(int64_t tick, T item) {
     if (index_.empty()) first_ = tick;
     if (tick < first_) {
-      // As much again as there is, so that ticks in falling order do not move it every time.
+      // The index grows by as much again, so that ticks in falling order do not move it every time.
       const int64_t more = std::min(first_, std::max(first_ - tick, std::ssize(index_)));
       index_.insert(index_.begin(), static_cast<size_t>(more), -1);
       first_ -= more;
@@ -43,7 +43,7 @@ class Series {
     }
   }
   bool empty() const { return paged_ ? paged_->empty() : items_.empty(); }
-  /// From now on `paged` has the items; for one that is empty.
+  /// From now on `paged` has the items. Precondition: the series is empty.
   void Page(std::shared_ptr<PagedSeries<T>> paged) { paged_ = std::move(paged); }
 
  private:

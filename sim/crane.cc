@@ -15,8 +15,8 @@ using Eigen::Vector3d;
 
 namespace {
 
-// By what the robot's weight stretches the spring: little beside the robot, so that it starts where
-// it is to stand, and soft beside its legs.
+// The robot's weight stretches the spring by this. It is little beside the robot, which so starts
+// where it is to stand, and leaves the spring soft beside its legs.
 constexpr double kSag = 0.01;  // m
 constexpr double kDampingRatio = 0.7;
 // The force is explicit in the step; a point of a link feels as little as a quarter of its mass.

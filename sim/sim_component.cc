@@ -25,7 +25,7 @@ ComponentTraits SimTraits(const std::string& engine) {
                     "sim.drive_train=", "sim.model_error=", "sim.motor_change="},
           // Until the controller follows, the robot hangs.
           .realtime = {{"sim.crane", "sim.crane.release_time=1"}},
-          // No command is late.
+          // In lockstep no command is late.
           .lockstep = {"sim.crane="}};
 }
 

@@ -123,7 +123,7 @@ Simulation::Simulation(const RobotModel& model, const SimConfig& config, const W
       fall_height_(config.fall_height()),
       fall_tilt_(config.fall_tilt()),
       terrain_(config, seed),
-      // In a block pressed down to the ground a corner meets both.
+      // A corner in a block that is pressed down to the ground meets both.
       world_(worlds(model_, (config.has_block() ? 2 : 1) * NumCorners(model_), step_)),
       drive_train_(SimulatedDriveTrain(model_, config)),
       drivetrain_options_(DrivetrainOptions(model_, motors_, drive_train_, config)),
@@ -487,7 +487,7 @@ void Simulation::DetectFall() {
   if (fallen_) return;
   const double upright = world_->rotation(model_.body_task_body())(2, 2);
   const double tilt = std::acos(std::clamp(upright, -1.0, 1.0));
-  // On blocks, above the lower sole: they lie deeper than the ground, and give way.
+  // On blocks the height counts from the lower sole: they lie deeper than the ground, and give way.
   double ground = 0;
   if (terrain_.has_field()) {
     ground = std::min(truth_.foot_pose[0].translation().z(), truth_.foot_pose[1].translation().z());

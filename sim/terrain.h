@@ -41,7 +41,7 @@ class Terrain {
     bool left;         ///< y > 0; else the other lane. A lane has no outer edge.
     double stiffness;  ///< N/m, under a whole sole
   };
-  /// As many as the field has; its height At() any place of it tells.
+  /// All tops of the field; At() any place of one tells its height.
   std::vector<FieldTop> FieldTops() const;
 
  private:

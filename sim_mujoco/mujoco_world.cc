@@ -331,7 +331,7 @@ MujocoWorld::SlipChange MujocoWorld::FindSlipChange() {
     Contact& contact = contacts_[static_cast<size_t>(i)];
     const double speed = std::hypot(d->efc_vel[row + 1] + step_ * d->efc_b[row + 1],
                                     d->efc_vel[row + 2] + step_ * d->efc_b[row + 2]);
-    // Beyond what a point that sticks creeps at.
+    // A point that sticks creeps: only what is beyond that counts as slip.
     const double creep = friction_softness_ * cone.friction[0] * d->efc_force[row];
     const double change = std::max(0.0, speed - creep) - contact.slip;
     all.largest = std::max(all.largest, std::abs(change) / (kSlipTolerance + kSlipShare * speed));

@@ -67,7 +67,7 @@ void Turn(dBodyID body, const Matrix3d& r) {
   dBodySetRotation(body, rotation);
 }
 
-// In the zero posture, in which ODE's hinges are made.
+// The robot's tree in the zero posture, in which ODE's hinges are made.
 std::vector<TreeStep::Body> Tree(const robot::RobotModel& model) {
   const robot::RobotState zero(model.num_joints());
   robot::RobotData data(model);
@@ -308,7 +308,7 @@ bool OdeWorld::StepTree() {
     dBodySetPosition(id, position.x(), position.y(), position.z());
     dBodySetLinearVel(id, body.linear.x(), body.linear.y(), body.linear.z());
     dBodySetAngularVel(id, body.angular.x(), body.angular.y(), body.angular.z());
-    // As ODE integrates a rotation when it is not told to do it to higher order.
+    // ODE integrates a rotation so when it is not told to do it to higher order.
     const dReal* q = dBodyGetQuaternion(id);
     dVector4 rate;
     dWtoDQ(dBodyGetAngularVel(id), q, rate);

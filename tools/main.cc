@@ -48,7 +48,8 @@ int Flushed(int code) {
 int main(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);  // a file that grows too large is an error that is told
   poise::UsePlainStreams();
-  // Before the commands, which tell what there is. Help and version are there without them.
+  // Modules come before the commands, which tell what there is. Help and version are there without
+  // them.
   std::exception_ptr modules;
   try {
     poise::LoadModules();

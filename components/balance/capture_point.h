@@ -9,7 +9,7 @@
 
 namespace poise::balance {
 
-/// On the plane of frame O.
+/// The capture point on the plane of frame O.
 struct CapturePoint {
   Eigen::Vector2d position = Eigen::Vector2d::Zero();  ///< m, frame O
   double frequency = 0;                                ///< rad/s, ω = √(g/h)

@@ -80,9 +80,9 @@ double Reach(const ConvexPolygon& sole, const Eigen::Matrix3d& rotation,
   return reach - kReachReserve;
 }
 
-/// The same where each foot has a centre of pressure of its own: η S_r + (1 − η) S_l holds what
-/// both can have together, and along each edge of either sole that sum reaches as far as η h_r +
-/// (1 − η) h_l.
+/// MomentBounds where each foot has a centre of pressure of its own: η S_r + (1 − η) S_l holds what
+/// both can have together, and along each edge of either sole that sum reaches as far as
+/// η h_r + (1 − η) h_l.
 Bounds FreeMomentBounds(const Vector6d& resultant, const FootArray<Eigen::Vector3d>& position,
                         const FootArray<Eigen::Matrix3d>& rotation, const SoleLimits& limits,
                         const FootArray<ConvexPolygon>& sole) {
@@ -195,8 +195,9 @@ double Select(const RatioInterval& interval, const Vector6d& resultant,
               double eta_max) {
   if (interval.feasible) return std::clamp(interval.optimal, interval.min, interval.max);
   const Bounds bounds = MomentBounds(resultant, position, rotation, limits);
-  // Side by side the soles lack as much at any η: noise alone would tell the best, and η, with the
-  // joints' torques, jump from end to end. Of what is as good, the nearest to η*.
+  // Side by side the soles lack as much at any η: noise alone would tell the best, and η would jump
+  // from end to end with the joints' torques. What is nearly as good counts as good, and the
+  // nearest of it to η* is taken.
   const double lacking =
       LeastViolation(bounds, eta_min, eta_max) + kIndifference * resultant.head<3>().norm();
   double lower = eta_min, upper = eta_max;
@@ -206,7 +207,7 @@ double Select(const RatioInterval& interval, const Vector6d& resultant,
     if (bound.a < 0) lower = std::max(lower, middle - half);
     if (bound.a > 0) upper = std::min(upper, middle + half);
   }
-  // Not so only where numbers are not finite.
+  // `lower` is above `upper` only where numbers are not finite.
   return lower <= upper ? std::clamp(interval.optimal, lower, upper) : eta_min;
 }
 

@@ -33,7 +33,8 @@ AccelerationRange ViableAccelerations(const JointRange& range, double position, 
   result.lower =
       -Largest(position - range.lower, -velocity, range.velocity, range.acceleration, horizon);
   if (result.lower > result.upper) {
-    // Between two limits too near to each other, or too fast for either: to rest.
+    // The two limits are too near to each other, or the joint is too fast for either: it is brought
+    // to rest.
     const double stop = std::clamp(-velocity / horizon, -range.acceleration, range.acceleration);
     result.lower = result.upper = stop;
   }

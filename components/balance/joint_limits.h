@@ -25,8 +25,8 @@ struct AccelerationRange {
   double lower = 0, upper = 0;  ///< rad/s², lower ≤ upper
 };
 
-/// For a horizon (s, > 0). Never beyond ±range.acceleration. From a state that is not viable any
-/// more: to stop as hard as that.
+/// Accelerations that, held over `horizon` (s, > 0), lead to viable states only. None is beyond
+/// ±range.acceleration. In a state that is not viable any more the joint stops as hard as that.
 AccelerationRange ViableAccelerations(const JointRange& range, double position, double velocity,
                                       double horizon);
 
@@ -43,8 +43,9 @@ class JointLimits {
   AccelerationRange Accelerations(int joint, double position, double velocity) const {
     return ViableAccelerations(range(joint), position, velocity, horizon_);
   }
-  /// The same of a joint of a leg that stands: beyond its range it is stopped, and not brought
-  /// back. Between contacts that takes the whole body, as hard as the joint alone could turn.
+  /// Accelerations for a joint of a leg that stands: beyond its range it is stopped, and not
+  /// brought back. To bring it back would move the whole body, as hard as the joint alone could
+  /// turn.
   AccelerationRange Stopping(int joint, double position, double velocity) const {
     const JointRange& own = range(joint);
     return Accelerations(joint, std::clamp(position, own.lower, own.upper), velocity);

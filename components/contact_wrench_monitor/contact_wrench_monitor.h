@@ -54,8 +54,8 @@ class ContactWrenchMonitor : public Component, public Operated {
   template <class Bounds>
   bool KeepLimits(const balance::ContactGeometry& geometry, const Bounds& bounds,
                   balance::BalanceResult* result);
-  /// While the planner makes steps: StepBalance, which holds the COM's height and the feet in the
-  /// air. False, and torque_ as it was, where it finds nothing.
+  /// Balances by StepBalance while the planner makes steps, which holds the COM's height and the
+  /// feet in the air. False, and torque_ as it was, where it finds nothing.
   bool MoveForStep(const balance::ContactGeometry& geometry, const balance::ConvexPolygon& region,
                    balance::BalanceResult* result);
   balance::ContactLimits Limits(const robot::FootArray<bool>& in_contact) const;
@@ -95,7 +95,8 @@ class ContactWrenchMonitor : public Component, public Operated {
   balance::ContactLimits double_support_, single_support_;
   std::optional<double> beyond_soles_;  // m
   bool polygon_ = false;                // the region is the soles' hull
-  // Less the margin, m, sole frames: alone on the ground, and with the other foot.
+  // The soles less the margin, m, sole frames: of a foot alone on the ground, and of one beside the
+  // other.
   robot::FootArray<balance::ConvexPolygon> sole_, shared_sole_;
   double cop_feedback_ = 0, cop_feedback_time_ = 0;  // share, s
   Eigen::Vector2d cop_error_ = Eigen::Vector2d::Zero();

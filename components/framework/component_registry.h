@@ -18,11 +18,11 @@ class ComponentRegistry {
   }
   /// nullptr when there is no such type.
   const ComponentFactory* Find(const std::string& type) const;
-  /// Likewise.
+  /// nullptr when there is no such type.
   const ComponentType* TypeNamed(const std::string& type) const;
-  /// Those of a type without any when there is no such type.
+  /// A type's traits; those of a type without any when there is no such type.
   const ComponentTraits& TraitsOf(const std::string& type) const;
-  /// By name.
+  /// All types, by name.
   const std::map<std::string, ComponentType>& entries() const { return entries_; }
 
  private:

@@ -42,7 +42,7 @@ struct ComponentTraits {
   std::vector<RemovablePart> parts = {};
   /// Settings without what is imperfect about the robot: --ideal.
   std::vector<std::string> ideal = {};
-  /// In real time, where a message may be late.
+  /// What is set in a run in real time, where a message may be late.
   std::vector<DefaultSetting> realtime = {};
   /// Settings of a run in lockstep beside one in real time, which take back what the latter was
   /// given.

@@ -12,7 +12,7 @@ namespace poise {
 
 /// Makes a component type known; called by a module's POISE_MODULE.
 void AddComponent(ComponentType type);
-/// In the order in which they came.
+/// The types that were added, in that order.
 const std::vector<ComponentType>& AddedComponents();
 
 /// Folders with files of users' own, first those of $POISE_PATH (parted by colons), then where

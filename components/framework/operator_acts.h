@@ -25,11 +25,11 @@ struct LiveSetting {
   double ramp;         ///< s in which a change is gone through, linearly; 0: at once
   double from = 0, to = 0;
   int64_t begin = 0;  ///< tick of the change
-  int64_t ticks = 0;  ///< that it takes; 0: none is under way
+  int64_t ticks = 0;  ///< that the change takes; 0: none is under way
 };
 
-/// All of a component. Declared in Configure; a change never makes a step that its ramp does not
-/// allow. Only Add allocates.
+/// All live settings of a component, declared in Configure. A change never makes a step that its
+/// ramp does not allow. Only Add allocates.
 class LiveSettings {
  public:
   explicit LiveSettings(double tick_period = 0) : period_(tick_period) {}
@@ -58,7 +58,7 @@ class ActInput final : public InputPort {
   /// The component's side, once a tick in its stage: the next act of this tick, other than those of
   /// settings(); nullptr: none.
   const operate::act_t* Next(const Tick& tick);
-  /// What became of the act that Next gave; without it DONE.
+  /// Says what became of the act that Next gave; without this call it is DONE.
   void Answer(int8_t verdict) { verdict_ = verdict; }
   LiveSettings& settings() { return settings_; }
   const LiveSettings& settings() const { return settings_; }

@@ -27,7 +27,7 @@ struct OptionalPort {
 /// Makes one known, once: NAME_type's function says so beside the ports that its type always has.
 void AddOptionalPort(const OptionalPort& port);
 
-/// Those of a component's type.
+/// The optional ports of a component's type.
 std::vector<OptionalPort> OptionalPortsOf(const std::string& component);
 
 /// "where hw_bridge.ethercat or hw_bridge.unitree is set", for a person.

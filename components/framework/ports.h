@@ -118,8 +118,8 @@ class OutputPort {
   /// Stamps run, tick and time; the runner calls it before each stage.
   virtual void Stamp(int64_t run_id, int64_t tick, int64_t utime) = 0;
 
-  /// In real time a stage may have nothing to say in a tick (a sensor did not answer): called in
-  /// it, the message of this tick is not sent. Never in lockstep, where readers wait for every
+  /// Called in a tick, it keeps the message of this tick from being sent: in real time a stage may
+  /// have nothing to say (a sensor did not answer). Never in lockstep, where readers wait for every
   /// tick.
   void Withhold() { withheld_ = true; }
   /// True once after Withhold.

@@ -18,7 +18,7 @@ inline double TickPeriod(double elapsed) { return std::clamp(elapsed, 0.0, kLong
 /// A condition that has to last until it counts: a load on a sole, a capture point beyond it.
 class LastingCondition {
  public:
-  /// From here on it has not held.
+  /// Forgets since when it holds.
   void Reset() { holds_ = false; }
   /// Once a tick: whether `holds` has been true in every tick for `duration` s. `time`: s, not
   /// decreasing.

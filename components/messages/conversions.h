@@ -40,9 +40,9 @@ double SoleMargin(const robot::RobotModel& model);
 /// m, off the edges of the soles' hull, that the centre of pressure of both keeps, so that it can
 /// be shared: near the outer edge the other sole still carries its least share.
 double HullMargin(const robot::RobotModel& model);
-/// `config`, with the smaller sole's half length and half width, each less `margin` (m), where it
-/// gives none. Of soles that are no rectangles: of the largest rectangle about the frames' origins
-/// that lies `margin` inside both.
+/// `config`; the half length and half width that it does not give are the smaller sole's, less
+/// `margin` (m). Soles that are no rectangles count as the largest rectangle about the frames'
+/// origins that lies `margin` inside both.
 ContactLimitsConfig WithinSoles(ContactLimitsConfig config, const robot::RobotModel& model,
                                 double margin);
 /// m, of the smaller sole: InnerRadius.

@@ -43,7 +43,7 @@ class ForeignComponent : public Component {
   void Configure(const ComponentContext& context, Wiring* wiring) override;
   std::string_view finished() const override { return finished_; }
   bool failed() const override { return failed_; }
-  /// From now on finished() says so; not a failure.
+  /// Ends the component without a failure: finished() gives `why` from now on.
   void Finish(std::string why) { finished_ = std::move(why); }
   /// What Step of the functions threw; nullptr: nothing.
   std::exception_ptr error() const { return error_; }

@@ -14,9 +14,9 @@ namespace poise {
 class QuinticMove {
  public:
   QuinticMove() { Hold(Eigen::Vector3d::Zero()); }
-  /// At rest at `position` for all time.
+  /// Rests at `position` for all time.
   void Hold(const Eigen::Vector3d& position);
-  /// From `from` at `start` to rest at `target` at start + duration, s. Duration 0 is a step.
+  /// Moves from `from` at `start` to rest at `target` at start + duration, s. Duration 0 is a step.
   void Begin(const PointMotion& from, const Eigen::Vector3d& target, double start, double duration);
   PointMotion At(double time) const;
   bool UnderWay(double time) const { return time > start_ && time < start_ + duration_; }

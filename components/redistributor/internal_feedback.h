@@ -36,7 +36,7 @@ class InternalFeedback {
   bool enabled() const { return enabled_; }
   /// 1/s; may change between calls.
   double* integral_rate() { return &rate_; }
-  /// From zero again.
+  /// Begins at zero again.
   void Reset() { integral_.setZero(); }
   /// `period`, s, since the last call. A `share` (0..1) of the answer is given, and integrated.
   InternalWrench Update(const InternalWrench& error, double period, double share);
@@ -45,7 +45,7 @@ class InternalFeedback {
   /// Share of the answer that acts with this ratio: all while the lighter foot has full_load of the
   /// load or more, none without load.
   double LoadShare(double eta) const;
-  /// Without a reading to go by.
+  /// The answer where there is no reading to go by.
   InternalWrench Hold(double share) const { return share * integral_; }
   void Archive(StateArchive* archive) { archive->Show(integral_); }
 

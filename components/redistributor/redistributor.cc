@@ -235,7 +235,8 @@ double Redistributor::RampedRatio(double free_ratio, const Vector6d& resultant,
   const Foot light = robot::FootAt(plan.transition_foot);
   const double ramped =
       balance::TransitionRatio(free_ratio, light, unloading, plan.transition_progress);
-  // Only the loaded foot's conditions count: both soles turned like it, the other's are the same.
+  // Only the loaded foot's conditions count: with both soles turned like it, the other's are the
+  // same.
   sole_in_o[light].linear() = sole_in_o[Other(light)].linear();
   const balance::RatioInterval allowed =
       balance::FeasibleRatio(resultant, sole_in_o, double_support_[Other(light)], 0.0, 1.0);

@@ -25,7 +25,7 @@ MassProperties Merged(const std::vector<MassProperties>& parts);
 /// possible. A part may be massless or a point.
 std::string WhyImpossible(const MassProperties& part);
 
-/// Likewise for a body that moves: positive mass, positive definite inertia.
+/// WhyImpossible of a body that moves: it takes positive mass and positive definite inertia.
 std::string WhyImmovable(const MassProperties& body);
 
 }  // namespace poise::robot

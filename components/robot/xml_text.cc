@@ -19,7 +19,8 @@ auto LineAt(std::string_view xml, size_t offset) {
   return 1 + std::ranges::count(xml.substr(0, offset), '\n');
 }
 
-// Where elements are open too deep, before any parser sees the text; npos: nowhere.
+// The place where elements are nested too deep, found before any parser sees the text; npos: there
+// is none.
 size_t TooDeep(std::string_view xml) {
   int depth = 0;
   for (size_t i = xml.find('<'); i != std::string_view::npos; i = xml.find('<', i + 1)) {

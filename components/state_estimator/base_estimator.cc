@@ -274,7 +274,8 @@ void BaseEstimator::UpdateAnchors(double dt) {
       continue;
     }
     const double loose = 1 - foot.grip, standing = foot.grip * share;
-    // Less the mean: disagreement vanishes, while the weighted mean of the anchors stays.
+    // The mean shift is taken off: disagreement vanishes, while the weighted mean of the anchors
+    // stays.
     foot.anchor.translation() += loose * shift[f] + standing * (shift[f] - mean_shift);
     const Vector3d turn =
         (loose + standing * (1 - foot.trust)) * RotationError(rotation, foot.anchor.linear());

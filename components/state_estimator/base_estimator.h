@@ -49,7 +49,7 @@ class BaseEstimator {
   const robot::FootArray<double>& foot_weight() const { return foot_weight_; }
   const Eigen::Vector3d& gyro_bias() const { return gyro_bias_; }  ///< rad/s, IMU frame
   /// m/s², IMU frame: what the accelerometer reads on average beyond gravity, as the orientation
-  /// has it. Of no effect on the state.
+  /// has it. It has no effect on the state.
   const Eigen::Vector3d& accelerometer_bias() const { return accelerometer_bias_; }
   /// Sole in the world: where the estimator holds it to stand, and where the kinematics see it.
   const Eigen::Isometry3d& anchor(robot::Foot foot) const { return feet_[foot].anchor; }
@@ -57,7 +57,7 @@ class BaseEstimator {
 
  private:
   struct FootState {
-    // From the base origin, world axes, of the step before.
+    // m, world axes: from the base's origin to the sole, in the step before.
     Eigen::Vector3d last_offset;
     Eigen::Isometry3d anchor;  ///< in the world
     Eigen::Vector3d turn;      ///< rad, from its present orientation to the anchor's, world axes

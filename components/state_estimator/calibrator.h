@@ -30,11 +30,11 @@ class Calibrator {
   bool enabled() const { return config_.enabled(); }
   /// Each tick, `dt` s after the last: the soles' wrenches, robot on environment, sole frames.
   void Track(const robot::FootArray<robot::Vector6d>& wrench, double dt);
-  /// With what the observer has found in this tick without any load; `usable`: both wrenches are
-  /// measured.
+  /// Follows what the observer has found in this tick, to which no load was told. `usable`: both
+  /// wrenches are measured.
   void Update(const WrenchObserver& observer, bool usable);
 
-  /// To be applied: the estimate, within bounds, reached smoothly.
+  /// The load to be applied: the estimate, within bounds, reached smoothly.
   const Load& load() const { return applied_; }
   const Load& estimate() const { return estimate_; }
   const Eigen::Matrix4d& covariance() const { return covariance_; }

@@ -31,17 +31,19 @@ constexpr double kLeastCompliance = 0.1, kMostCompliance = 10;
 constexpr double kExcessTime = 0.05;
 // m between the soles: below it they do not show the heading.
 constexpr double kLeastStance = 0.02;
-// Before the ground defines the world, which leaves nothing of it: rad, m.
+// How far off the base may be before the ground defines the world, which leaves nothing of it: rad,
+// m.
 constexpr double kUnplacedTurn = 0.1, kUnplaced = 0.1;
-// Standing still at first, as far as feet and IMU can move against each other unseen.
+// The robot stands still at first, as far as feet and IMU can move against each other unseen.
 constexpr double kStartSpeed = 0.01;  // m/s
 // s, in which the ringing of a gear dies away: rotor and link of a tenth of a kg·m² on a harmonic
 // drive, damped by a twentieth of critical.
 constexpr double kRinging = 0.03;
 // A foot that has not come to rest for this long with no other to stand on is the world.
 constexpr double kLongestSlip = 0.5;  // s
-// So are two soles that carry the robot and do not go past each other faster than this: what moves
-// both alike is the base's estimate, as a blow leaves it that the accelerometer has not seen.
+// Two soles that carry the robot and do not go past each other faster than this are the world, too:
+// what moves both alike is an error of the base's estimate, as a blow leaves it that the
+// accelerometer has not seen.
 constexpr double kTogether = 0.02;  // m/s
 // Beyond these nothing is known of the base: in flight, or on a hoist, for minutes.
 constexpr double kLostTilt = 0.5, kLostSpeed = 10;  // rad, m/s, standard deviations
@@ -156,7 +158,7 @@ void InvariantEstimator::ReadSoles() {
     reading.position =
         kinematics_.imu_rotation().transpose() * (sole.position - kinematics_.imu_position());
     reading.rotation = kinematics_.imu_rotation().transpose() * sole.rotation;
-    // In world axes: of position, of rotation by position, of rotation.
+    // Covariances in world axes: of position, of rotation by position, of rotation.
     Matrix3d linear = Matrix3d::Zero(), mixed = linear, angular = linear;
     const auto add_noise = [&](double variance, const Vector3d& shift, const Vector3d& turn) {
       for (int i = 0; i < 3; ++i) {
@@ -172,8 +174,8 @@ void InvariantEstimator::ReadSoles() {
       const Vector3d shift = base * column.head<3>(), turn = base * column.tail<3>();
       double variance = Square(encoder_noise_[j]);
       if (config_.gear_stiffness() > 0) {
-        // The same error for kRinging, of which white noise must be so much larger to tell as
-        // little.
+        // A gear that rings errs in one way for kRinging: white noise must be so much larger to
+        // tell as little.
         variance += kRinging / period_ * Square(unrest_[j] / config_.gear_stiffness());
         const double windup = torque_[j] / config_.gear_stiffness();
         lag -= windup * shift;
@@ -436,7 +438,7 @@ void InvariantEstimator::ComeToRest(Foot f, bool other_stands, double dt) {
       const bool together = feet_[Other(f)].loaded &&
                             (Apart(f) - foot.apart_start).norm() < kTogether * config_.rest_time();
       if (!other_stands && (together || foot.slip_time > kLongestSlip)) {
-        // Then it is the world, and the base's velocity is what is wrong.
+        // The foot is the world then, and the base's velocity is what is wrong.
         filter_.Doubt(0, Square(way / config_.rest_time()), 0);
       } else if (way > config_.rest_distance() + 3 * speed * config_.rest_time()) {
         foot.slip_left = config_.rest_time();

@@ -28,7 +28,7 @@ class JointErrors {
 
   /// Time goes by, `dt` s, before this tick's Learn.
   void Age(double dt);
-  /// From here on anew for this joint: its foot has been lifted.
+  /// Begins anew for a joint whose foot has been lifted.
   void Begin(size_t joint) { joint_[joint] = {}; }
   /// A reading of a free leg's joint, `dt` s after the last: its row's torque that no foot carries,
   /// N·m; and the row's `variance`,

@@ -20,10 +20,10 @@ class LowPass {
   /// The output's first derivative, 1/s of the signals.
   const Eigen::VectorXd& rate() const { return rate_; }
   /// Its second derivative, 1/s², the mean over the last step: at the step's end alone the input,
-  /// held over the step, would be too old by half of it, an error of −ω² dt/2 times rate(). Of the
-  /// last Step of this process: not archived.
+  /// held over the step, would be too old by half of it, an error of −ω² dt/2 times rate(). It is
+  /// that of the last Step of this process, and not archived.
   const Eigen::VectorXd& curvature() const { return curvature_; }
-  /// At rest at `input`.
+  /// Rests at `input`.
   void Reset(const Eigen::VectorXd& input);
   void Archive(StateArchive* archive) { archive->Show(value_, rate_); }
 

@@ -267,7 +267,7 @@ ComponentType StateEstimatorType() {
       "state_estimator",
       "floating base and joint velocities from IMU, encoders and feet",
       [] { return std::make_unique<StateEstimator>(); },
-      // What it knows of the drive train.
+      // An ideal drive train has no delay and no gears that give.
       {.ideal = {"state_estimator.invariant_ekf.sensor_delay=0",
                  "state_estimator.invariant_ekf.gear_stiffness=0"},
        .methods = {"state_estimator.method=ANCHORED_FEET", "state_estimator.method=INVARIANT_EKF"}},

@@ -21,7 +21,8 @@ using Matrix6x12 = Eigen::Matrix<double, 6, 12>;
 // No robot exceeds these: they keep every finite reading from making a number that is not.
 constexpr double kMaxPosition = 1e3, kMaxRate = 100, kMaxForce = 1e3, kMaxTorque = 1e4;
 constexpr double kLongestStep = 0.1;  // s: after a longer gap the filter starts anew
-// Before any row: no foot carries more, shares of the weight, and of the weight at a metre.
+// What is known before any row: no foot carries more, shares of the weight, and of the weight at a
+// metre.
 constexpr double kPriorForce = 2, kPriorMoment = 0.3;
 // (N·m)², of a joint's row at least, beside what encoder steps leave of the rotor's acceleration.
 constexpr double kLeastVariance = 0.01;
@@ -134,7 +135,7 @@ void WrenchObserver::ReadMotion(const ObserverCorrection& correction) {
   const Vector3d gyro = filter_.value().segment<3>(n) - correction.gyro_bias;
   Matrix3d to_base = imu.pose.linear();
   if (b != 0) {
-    // Between it and the base lie joints: their axes first.
+    // Joints lie between the IMU and the base: their axes are computed first.
     state_.base_angular_velocity.setZero();
     robot::ComputeKinematics(*model_, state_, &data_);
     to_base = data_.body_rotation[b] * imu.pose.linear();

@@ -51,8 +51,9 @@ class WrenchObserver {
   /// Robot on environment, each in its sole's frame, N and N·m.
   const Wrenches& wrenches() const { return wrenches_; }
   const Covariance& covariance() const { return covariance_; }
-  /// The same without what the low-pass lags behind, of wrenches that do not change; and of a foot
-  /// that hangs free, or did a moment ago, as small as what it seemed to carry.
+  /// The covariance without what the low-pass lags behind, as it is of wrenches that do not change.
+  /// Of a foot that hangs free, or did a moment ago, it is as small as what the foot seemed to
+  /// carry.
   const Covariance& settled_covariance() const { return settled_covariance_; }
   /// Whether the foot was seen to hang free at the last Observe that learns.
   bool free(robot::Foot foot) const { return free_foot_[foot].free(); }
@@ -103,9 +104,9 @@ class WrenchObserver {
   Wrenches wrenches_ = Wrenches::Zero(), rate_ = Wrenches::Zero(), estimate_ = Wrenches::Zero();
   Covariance covariance_ = Covariance::Identity(), spread_ = Covariance::Identity();
   Covariance settled_covariance_ = Covariance::Identity();
-  // By leg joint, N·m: what friction holds, which a joint that has slipped one way goes on doing
-  // when it sticks, until it is bent back; and its standard deviation, before it has slipped for
-  // the first time anything up to break-away.
+  // By leg joint, N·m: what friction holds, and its standard deviation. A joint that has slipped
+  // one way still holds it when it sticks, until it is bent back. Before the first slip it may be
+  // anything up to break-away.
   Eigen::VectorXd bristle_, bristle_error_;
   Eigen::VectorXd noise_;  // (N·m)², by leg joint: the row's variance at least
   JointErrors errors_;     // by leg joint

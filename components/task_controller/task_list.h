@@ -25,7 +25,8 @@ using FeetInContact = robot::FootArray<bool>;
 balance::TaskGains ReadGains(const Gains& gains, const std::string& field,
                              bool has_position = true);
 
-/// Those of the configuration, and of `rule` what it does not give. Throws ConfigError.
+/// The gains of the configuration; those that it does not give are those of `rule`. Throws
+/// ConfigError.
 balance::StandingGains ReadStandingGains(const TaskControllerConfig& config,
                                          const balance::StandingGains& rule);
 

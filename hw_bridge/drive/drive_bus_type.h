@@ -30,7 +30,7 @@ struct DriveBusType {
   std::string all_sensors = {};
   /// What of the group anything else must know, by paths in the group.
   DriveLink link = {};
-  /// As ComponentType has it; nullptr: the bridge's own schema has the group.
+  /// The schema that has the group, as ComponentType has its own; nullptr: it is the bridge's.
   std::string_view (*schema)() = nullptr;
 };
 

@@ -10,7 +10,7 @@
 namespace poise::ethercat {
 namespace {
 
-// Between two rounds over all slaves: errors are to be seen while someone looks on, not sooner.
+// Two rounds over all slaves are this far apart: errors need only be seen while someone looks on.
 constexpr int64_t kRound = 20 * kMillisecond;
 constexpr int64_t kLookAgain = 2 * kMillisecond;  // at a slave that is not in OP
 constexpr int kAttempts = 3;                      // frames for a datagram

@@ -57,7 +57,7 @@ enum class CoeService : uint8_t {
 enum class SdoCommand {
   kUploadRequest,
   kUploadResponse,   ///< expedited, or the first part of a normal or segmented transfer
-  kDownloadRequest,  ///< likewise
+  kDownloadRequest,  ///< as kUploadResponse
   kDownloadResponse,
   kUploadSegmentRequest,
   kUploadSegmentResponse,

@@ -378,7 +378,7 @@ bool Master::Stop() {
     Put<uint16_t>(bytes, 0, 0);
     const auto counter = transactions_.Execute(Command::kBrd, 0, reg::kAlStatus, bytes);
     silent = counter ? 0 : silent + 1;
-    // Those that are not there do not come by being waited for.
+    // To wait does not bring slaves that are not there.
     if (counter && bytes[0] == static_cast<uint8_t>(AlState::kInit)) {
       return *counter == num_slaves();
     }
@@ -434,7 +434,8 @@ bool Master::Send(Exchange exchange) {
     builder_.Add(Command::kFrmw, cyclic_index_, slaves_[clocks_.reference].station(),
                  reg::kDcSystemTime, time);
   }
-  // With the outputs: their answer is not waited for within the cycle.
+  // The attendant's datagram goes with the outputs, whose answer is not waited for within the
+  // cycle.
   if (attendant_ && exchange != Exchange::kRead) {
     attendant_->BeginCycle(transactions_.link()->Now(), trouble_);
     acyclic_ = attendant_->slot().Take();

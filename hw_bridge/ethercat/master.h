@@ -81,7 +81,7 @@ class Master {
   uint64_t input(const ProcessImage::Place& place) const {
     return ProcessImage::Extract(place, image_bytes_);
   }
-  /// As read at start.
+  /// What the drive said at the start that it is.
   const Identity& identity(size_t drive) const { return identities_[drive]; }
   const FrameCounts& counts() const { return transactions_.counts(); }
   int64_t short_working_counters() const { return short_working_counters_; }

@@ -154,7 +154,8 @@ Sdo SlaveAccess::Exchange(const Sdo& request, const std::string& what) {
     const CoeMessage message = ReceiveCoe(deadline, what);
     if (message.service == CoeService::kSdoInformation) continue;
     const Sdo& sdo = message.sdo;
-    // Another object's answer is that to what had been given up; segments name none.
+    // An answer of another object belongs to a request that had been given up; segments name no
+    // object.
     const bool ours = IsSegmentRequest(request.command) || sdo.object == request.object;
     if (ours && sdo.command == SdoCommand::kAbort) {
       throw SdoAbortError(fmt::format("{}: {}: SDO abort 0x{:08X} ({})", Describe(), what,

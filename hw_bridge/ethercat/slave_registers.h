@@ -13,7 +13,7 @@
 
 namespace poise::ethercat {
 
-/// As the slave's EEPROM has it.
+/// What a slave's EEPROM says that it is.
 struct Identity {
   uint32_t vendor = 0, product = 0, revision = 0, serial = 0;
 };

@@ -24,14 +24,15 @@ class SlaveSetup {
   bool is_drive(size_t slave) const { return slave < num_drives(); }
   std::string NameOf(size_t slave) const;
   const DriveProfile& ProfileOf(size_t slave) const;
-  /// As configured; nullopt: any.
+  /// What the configuration asks of a slave; nullopt: any will do.
   std::optional<uint32_t> SerialOf(size_t slave) const;
   std::optional<uint32_t> IdentificationOf(size_t slave) const;
   std::optional<uint32_t> AliasOf(size_t slave) const;
 
-  /// In INIT: its identity, which must be the configured one.
+  /// Reads the identity of a slave in INIT, which must be the configured one.
   Identity Check(size_t slave, SlaveAccess* access) const;
-  /// From INIT to PRE-OP, with process data set up: everything that SAFE-OP takes but clocks.
+  /// Takes a slave from INIT to PRE-OP and sets up its process data: all that SAFE-OP takes but
+  /// clocks.
   void Configure(size_t slave, SlaveAccess* access) const;
 
  private:

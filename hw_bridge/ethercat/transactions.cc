@@ -13,7 +13,7 @@ std::optional<uint16_t> Transactions::Execute(Command command, uint16_t adp, uin
     if (!builder_.Add(command, sent.index, adp, ado, data)) return std::nullopt;
     if (!link_->Send(builder_.bytes())) {
       ++counts_.send_errors;
-      // As for a lost frame: a link that is down for a moment is given the same time.
+      // A link that is down for a moment is given the time of a lost frame.
       static_cast<void>(link_->Receive(received_, link_->Now() + timeout_));
       continue;
     }

@@ -36,7 +36,7 @@ class Words {
   void Add(const T (&values)[N]) {
     for (const T& value : values) Add(value);
   }
-  /// To a multiple of four bytes, where a structure ends.
+  /// Goes on to a multiple of four bytes, where a structure ends.
   void FillUp() { position_ = (position_ + 3) / 4 * 4; }
   uint32_t Crc() {
     FillUp();

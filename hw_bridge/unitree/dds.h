@@ -48,7 +48,7 @@ class Endpoint {
   bool WriteSample(const void* sample);
   /// `sent`, unless null: when its writer gave it away, ns since the epoch by the writer's clock.
   bool TakeSample(void* sample, int64_t* sent);
-  /// Until a sample is there or the deadline of MonotonicNow.
+  /// Waits until a sample is there, at most until `deadline` of MonotonicNow. True: there is one.
   bool AwaitSample(int64_t deadline);
 
  private:

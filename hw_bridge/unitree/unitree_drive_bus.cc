@@ -120,7 +120,7 @@ std::string UnitreeDriveBus::Stop() {
 
 bool UnitreeDriveBus::ReceiveState(int64_t deadline, bool in_run) {
   bool taken = false;
-  // All that have come: another's damaged state does not hide a good one.
+  // All states that have come are read: another's damaged state does not hide a good one.
   for (int i = 0; i < kMostStates && link_->Receive(&incoming_, taken ? 0 : deadline); ++i) {
     if (incoming_.crc != CrcOf(incoming_)) {
       ++damaged_;

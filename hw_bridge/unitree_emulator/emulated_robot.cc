@@ -86,7 +86,7 @@ void EmulatedRobot::FillMotors(const drive_feedback_t& feedback) {
   }
 }
 
-/// On the state that leaves.
+/// Troubles change the state that leaves.
 void EmulatedRobot::ApplyTroubles() {
   uint16_t buttons = 0;
   for (const Trouble& trouble : troubles_) {

@@ -102,7 +102,7 @@ void UnitreeEmulator::Sense(const Tick& tick) {
     sensor_feedback_.Withhold();
     return;
   }
-  // Until then it stood as its file says, not as the scenario has it begin.
+  // Before the first tick the robot stood as its file says, not as the scenario has it begin.
   if (cycle_ == 0) robot_->Place();
   last_feedback_ = *drive_feedback_;
   cycle_ = static_cast<uint32_t>(tick.index + 1);

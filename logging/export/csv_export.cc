@@ -339,7 +339,7 @@ std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::
     const MessageType* const type = messages.TypeOf(event);
     auto found = index.find(event.channel);
     if (found == index.end()) {
-      // Without a graph: whatever is no service of the run.
+      // Without a graph a channel is exported when it is no service of the run.
       if (messages.run_known() || type == nullptr || type->has_strings ||
           !IsFileName(event.channel) || columns.size() == kMostChannels) {
         continue;

@@ -35,11 +35,11 @@ std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::
 class McapTopics {
  public:
   virtual ~McapTopics() = default;
-  /// Before the first message.
+  /// Called before the first message.
   virtual void Begin(McapWriter* writer) = 0;
-  /// After the message itself. `type` is the event's, well formed.
+  /// Called after each message. `type` is the event's, well formed.
   virtual void Add(const MessageType& type, const LogEvent& event, McapWriter* writer) = 0;
-  /// After the last one.
+  /// Called after the last message.
   virtual void End(McapWriter* writer) = 0;
 };
 

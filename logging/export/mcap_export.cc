@@ -28,7 +28,7 @@ McapWriter::Texts RunTexts(const LogMessages& messages) {
   return utf8;
 }
 
-/// By "type.field", of the structs in messages too.
+/// Units by "type.field", of the structs in messages too.
 McapWriter::Texts Units() {
   McapWriter::Texts units;
   const auto add = [&](const auto& self, const std::string& type) -> void {

@@ -220,7 +220,7 @@ void McapWriter::Close() {
   EndChunk();
   WriteRecord(kDataEnd, Fields().Add(crc_).bytes());
 
-  crc_ = 0;  // from here on of the summary
+  crc_ = 0;  // from here on it is the summary's
   const uint64_t summary_start = position_;
   Fields counts;
   for (const auto& [channel, count] : message_counts_) counts.Add(channel).Add(count);

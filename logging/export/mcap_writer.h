@@ -24,10 +24,10 @@ class McapWriter {
   /// PartialFile refuses.
   McapWriter(const std::string& path, const std::string& library);
 
-  /// Texts must be UTF-8; at most 65,535 schemas and as many channels.
-  /// Its id; a channel names it. `encoding` e.g. "protobuf".
+  /// Texts must be UTF-8; at most 65,535 schemas and as many channels. Returns the schema's id,
+  /// which a channel names. `encoding`: e.g. "protobuf".
   uint16_t AddSchema(const std::string& name, const std::string& encoding, const std::string& data);
-  /// Its id. `encoding` of its messages, e.g. "protobuf".
+  /// Returns the channel's id. `encoding`: of its messages, e.g. "protobuf".
   uint16_t AddChannel(uint16_t schema, const std::string& topic, const std::string& encoding,
                       const Texts& metadata);
   /// `time` in ns.

@@ -19,16 +19,16 @@ class PageRows {
  public:
   /// A row a tick, of ticks [first, end).
   PageRows(int64_t first, int64_t end);
-  /// At most about `most_rows` rows: each tick near those of `focus`, which come in order of
-  /// importance, and near both ends, and rows of as many ticks as it takes elsewhere. `period`: of
-  /// a tick, s. A row a tick where all ticks fit.
+  /// Makes at most about `most_rows` rows. A tick has its own near those of `focus`, which come in
+  /// order of importance, and near both ends; elsewhere a row has as many ticks as it takes. Where
+  /// all ticks fit, each has a row. `period`: of a tick, s.
   PageRows(int64_t first, int64_t end, int64_t most_rows, double period,
            std::span<const int64_t> focus);
 
   const std::vector<RowSpan>& spans() const { return spans_; }
   int64_t size() const { return size_; }  ///< rows
   bool every_tick() const { return every_tick_; }
-  /// Those of `focus` whose surroundings found no room.
+  /// How many of `focus` found no room for their surroundings.
   int64_t left_out() const { return left_out_; }
   /// The row of a tick; -1: it is not in one. `stride`: its row's.
   int64_t RowOf(int64_t tick, int64_t* stride) const;

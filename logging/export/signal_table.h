@@ -49,8 +49,8 @@ struct ChannelRows {
   std::vector<RowColumn> columns;
 };
 
-/// The same channels as ReadColumns, by row: memory grows with the rows and not with the log.
-/// Throws LogError.
+/// The channels of ReadColumns by row: memory grows with the rows and not with the log. Throws
+/// LogError.
 std::vector<ChannelRows> ReadRows(const std::string& path, const RunRecord& run,
                                   const PageRows& rows);
 

@@ -84,7 +84,7 @@ struct EstimatorError {
 };
 EstimatorError BaseError(const robot_state_t& estimate, const ground_truth_t& truth);
 
-/// The same as ESTIMATOR_STATUS orders it: orientation (rotation vector of estimate times truth
+/// BaseError as ESTIMATOR_STATUS orders it: orientation (rotation vector of estimate times truth
 /// inverted, rad), linear velocity (m/s), position (m), world axes.
 Eigen::Matrix<double, 9, 1> BaseErrorVector(const robot_state_t& estimate,
                                             const ground_truth_t& truth);

@@ -28,7 +28,8 @@ class ReferenceEnds {
     std::array<double, 2> level{plan.foot_reference[0].position[2],
                                 plan.foot_reference[1].position[2]};
     int at = phase_;
-    // As the phases follow each other when all goes well; a plan may go round in circles.
+    // Phases are taken as they follow each other when all goes well; a plan may go round in
+    // circles.
     for (size_t steps = 0; at >= 0 && steps < schedule_->phases.size(); ++steps) {
       const PhasePlan& phase = schedule_->phases[static_cast<size_t>(at)];
       if (at != phase_ && phase.double_support) break;
@@ -104,7 +105,7 @@ std::vector<TouchDown> TouchDowns(const RunRecord& run) {
     for (size_t foot = 0; before != nullptr && foot < 2; ++foot) {
       const int8_t was = before->foot_state[foot], is = plan->foot_state[foot];
       const bool off = was != support_plan_t::FOOT_SUPPORT && was != support_plan_t::FOOT_TOUCHING;
-      // From a swing straight to support the schedule alone decided.
+      // The schedule alone decided on a foot that goes from a swing straight to support.
       const bool confirmed =
           is == support_plan_t::FOOT_TOUCHING ||
           (is == support_plan_t::FOOT_SUPPORT && was == support_plan_t::FOOT_SEARCHING);

@@ -80,8 +80,8 @@ Answer ObserverNees(const RunRecord& run, int64_t tick) {
   return error.dot(factors.solve(error));
 }
 
-/// When the foot's true load had been above kTrueTouchLoad for kTrueTouchTime, of the load at
-/// `tick` and since when it is that large; empty when it is not.
+/// The tick at which the foot's true load, that of `tick`, has been above kTrueTouchLoad for
+/// kTrueTouchTime; empty where it is not above it at `tick`.
 std::optional<int64_t> TrueTouch(const RunRecord& run, size_t foot, int64_t tick) {
   const auto lasts = static_cast<int64_t>(std::lround(kTrueTouchTime / run.spec.tick_period()));
   const auto loaded = [&](int64_t t) {

@@ -9,7 +9,7 @@ namespace {
 
 using JointValue = std::function<Answer(const RunRecord& run, int64_t tick, size_t joint)>;
 
-/// Over ticks and joints. `of`: the joint it is of.
+/// The largest value over ticks and joints. `of`: the joint that has it.
 Answer MaximumOverJoints(const RunRecord& run, const JointValue& value, size_t* of = nullptr) {
   Answer largest;
   for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {

@@ -23,7 +23,7 @@ Eigen::Vector3d Up(const ground_truth_t& truth) {
   return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).conjugate() * Eigen::Vector3d::UnitZ();
 }
 
-/// At time 0, or where a part of a run begins; nullptr: there is none.
+/// The truth at time 0, or where a part of a run begins; nullptr: there is none.
 const ground_truth_t* Start(const RunRecord& run) {
   for (int64_t tick = run.spec.lead_ticks(); tick < run.num_ticks; ++tick) {
     if (const ground_truth_t* truth = run.truth.at(tick)) return truth;

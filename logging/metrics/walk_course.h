@@ -17,7 +17,7 @@ struct WalkCourse {
 
 /// What is gone or turned after the robot is down counts for nothing. Needs GROUND_TRUTH.
 WalkCourse FollowedCourse(const RunRecord& run);
-/// The same without what was followed: of a run without GROUND_TRUTH, too.
+/// The course without what was followed, which a run without GROUND_TRUTH has, too.
 WalkCourse CommandedCourse(const RunRecord& run);
 
 /// rad, about the vertical: where the base's x axis points.

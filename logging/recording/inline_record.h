@@ -16,7 +16,7 @@ class InlineRecord {
  public:
   /// Installs itself as the runner's tap, and keeps nothing of RunRecord::other. Throws RobotError.
   InlineRecord(const RunSpec& spec, const std::string& scenario, InlineRunner* runner);
-  /// For who has a tap of its own and calls Add in it. Throws RobotError.
+  /// Installs no tap: the caller has one that calls Add. Throws RobotError.
   InlineRecord(const RunSpec& spec, run_info_t info, const InlineRunner* runner);
 
   void Add(int channel, const OutputPort& output, const Tick& tick);

@@ -13,7 +13,7 @@
 
 namespace poise::logging {
 
-/// Each component's detail where a person has ended a run that only ends so.
+/// What each component's health tells where a person has ended a run that would not end by itself.
 inline constexpr char kEndedByHand[] = "ended by hand";
 
 /// The health of a component (an index in the graph) as it stands.
@@ -28,7 +28,7 @@ class InlineRecorder {
   InlineRecorder(const std::string& path, const RunSpec& spec, const run_info_t& info,
                  InlineRunner* runner, InlineRecord* kept = nullptr);
 
-  /// For who sets a tap of its own afterwards and calls Add in it.
+  /// A caller that sets a tap of its own afterwards calls this in it.
   void Add(int channel, const OutputPort& output, const Tick& tick);
 
   /// A message of an external channel; the constructor has the runner call it.

@@ -13,8 +13,8 @@ namespace poise::logging {
 struct ChannelBits {
   std::string name;
   uint64_t crc64 = 0;  ///< CRC-64/XZ of all messages, in order
-  /// For each tick the last byte of the CRC up to it: a difference shows in its own tick with
-  /// 255/256, and in crc64 for certain.
+  /// The last byte of the CRC up to each tick: a difference shows in its own tick with 255/256, and
+  /// in crc64 for certain.
   std::vector<uint8_t> by_tick;
 };
 

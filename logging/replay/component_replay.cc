@@ -172,8 +172,8 @@ class ReplayedStages {
     return found == connections.end() ? "" : found->channel();
   }
 
-  /// Its index in the log's graph, of which another configuration may have channels more or less;
-  /// -1: it is not there.
+  /// The index of the port's channel in the log's graph, which another configuration may have more
+  /// or fewer channels than; -1: it is not there.
   int ChannelOf(const Connections& connections, const std::string& port) const {
     const std::string name = ChannelName(connections, port);
     const auto& channels = log_.spec().graph().channel();
@@ -246,8 +246,8 @@ class ReplayedStages {
         ++acts_;
         const auto answer = answers.find(act.id);
         if (answer == answers.end()) {
-          // Without one it may have died with its process; the tick that it names is the best
-          // guess.
+          // An act without an answer may have died with its process; the tick that it names is the
+          // best guess.
           ++unanswered_acts_;
           placed_acts_.push_back({act, act.tick});
         } else if (answer->second.verdict == operate::answer_t::VERDICT_DONE) {

@@ -86,7 +86,7 @@ class LogReplay {
   std::string path_;
   LogMessages messages_;
   std::vector<Lane> lanes_;                             // by channel of the graph
-  std::vector<std::vector<ExternalMessage>> external_;  // likewise
+  std::vector<std::vector<ExternalMessage>> external_;  // by channel of the graph
 };
 
 }  // namespace poise::logging

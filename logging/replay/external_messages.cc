@@ -49,7 +49,8 @@ std::optional<int64_t> NearestTick(const Statuses& statuses, int64_t near, int64
 
 bool Stopped(const bridge_status_t& status) { return status.state == bridge_status_t::STATE_ESTOP; }
 
-/// By an operator's message, as far as the reason tells: of a stop within a stop it is the first.
+/// Whether an operator's message stopped the bridge, as far as the reason tells: a stop within a
+/// stop leaves the reason of the first.
 bool StoppedByMessage(const bridge_status_t* before, const bridge_status_t& now) {
   return Stopped(now) && (before == nullptr || !Stopped(*before)) &&
          now.reason != bridge_status_t::REASON_DRIVE_STO &&
@@ -84,7 +85,7 @@ void PlaceEmergencyStops(const Statuses& statuses, std::vector<ExternalMessage>*
       message.tick = *tick;
       message.certain = true;
     } else if (stops_now && !resets_now) {
-      // Without effect on a bridge that had stopped by then.
+      // It had no effect on a bridge that had stopped by then.
       const auto before = StatusAt(statuses, std::max(message.tick - kReach, last));
       message.certain = before && Stopped(*before);
     }

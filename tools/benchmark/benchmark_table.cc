@@ -52,7 +52,7 @@ BenchmarkFigure LeastOf(const std::vector<BenchmarkFigure>& points) {
     const std::vector<double> values = AllOf(points, pick);
     if (!values.empty()) least.*pick = *std::ranges::min_element(values);
   }
-  // That of the smallest, of equal ones the one that says most.
+  // The bound is that of the smallest value; of equal ones the one that says most.
   const auto rank = [](const std::string& bound) {
     return bound == kBelow ? 0 : bound.empty() ? 1 : 2;
   };
@@ -65,7 +65,7 @@ BenchmarkFigure LeastOf(const std::vector<BenchmarkFigure>& points) {
   return least;
 }
 
-/// Without the value of a limit.
+/// Where a run lies, without the value of a limit.
 std::string PlaceOf(const SweepPoints& points, int64_t run) {
   SweepRow row;
   row.run = run;

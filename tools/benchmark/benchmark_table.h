@@ -40,7 +40,7 @@ std::vector<BenchmarkFigure> BenchmarkFigures(const BenchmarkResult& result);
 /// digest tells whether two machines measured the same.
 std::string BenchmarkCsv(const std::vector<BenchmarkResult>& results);
 
-/// The same for people, in aligned columns.
+/// BenchmarkCsv for people, in aligned columns.
 std::string FormatBenchmark(const std::vector<BenchmarkResult>& results);
 
 /// SHA-1 of `text` as 40 hexadecimal digits, as sha1sum prints it.

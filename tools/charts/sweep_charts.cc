@@ -34,13 +34,13 @@ std::string CommandOf(const Sweep& sweep, const std::string& what) {
   if (!what.empty()) {
     command += what;
   } else {
-    // Its name, where that leads to the same file.
+    // The scenario is called by its name where that leads to the same file.
     std::string scenario = sweep.scenario();
     const std::string name = fs::path(scenario).stem().string();
     try {
       if (FindFile("scenarios", name, fs::current_path()) == fs::path(scenario)) scenario = name;
     } catch (const ConfigError&) {
-      // Then the file itself is named.
+      // The name leads nowhere: the file itself is named.
     }
     command += ShellWord(scenario);
   }

@@ -40,7 +40,7 @@ class ChildProcess {
   /// "exited with code 3", "was killed by signal 9 (Killed)". Precondition: ended().
   std::string HowItEnded() const;
   ProcessorTime processor_time() const;
-  /// To the whole process group; nothing when it has ended.
+  /// Sends a signal to the whole process group; nothing when it has ended.
   void Signal(int signal);
 
  private:

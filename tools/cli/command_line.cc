@@ -161,7 +161,7 @@ std::string UsageProblem(const CLI::App& app, const CLI::ParseError& error) {
       what = fmt::format("{} {}", what.substr(0, colon),
                          again ? "may be given once" : "needs a value");
     }
-    // Who says it stands in front already: "poise: run: ...".
+    // "poise: " stands in front already: what is added is the command, as in "poise: run: ...".
     const size_t space = name.find(' ');
     const std::string command_alone =
         space == std::string::npos ? "" : name.substr(space + 1) + ": ";

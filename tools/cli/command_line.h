@@ -7,8 +7,8 @@
 
 namespace poise {
 
-/// The help's layout: an option's meaning before what it goes with. For the root, before its
-/// commands are added: they take it over.
+/// Lays out the help: an option's meaning comes before what it goes with. The root takes it before
+/// its commands are added, which take it over.
 std::shared_ptr<CLI::FormatterBase> MakeHelpFormatter();
 
 /// The help of the command that was asked about, in the terminal's width.

@@ -14,8 +14,8 @@ namespace poise {
 /// ("--out"). Throws ConfigError.
 void CheckFolderFree(const std::string& flag, const std::filesystem::path& folder, bool force);
 
-/// The same for a file; a device or a pipe is always free. Logs are left to who writes: nothing
-/// replaces one (PartialFile).
+/// CheckFolderFree for a file; a device or a pipe is always free. Logs are left to who writes:
+/// nothing replaces one (PartialFile).
 void CheckFileFree(const std::string& flag, const std::filesystem::path& file, bool force);
 
 /// Bytes that the log of a run will take: its messages' sizes and rates. `spec` holds the channels'

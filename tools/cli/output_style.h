@@ -34,7 +34,7 @@ std::string Wrapped(std::string_view text, int width, int indent = 0);
 /// `text` with the characters that Poise uses in ASCII: "-" for "─", ">=" for "≥". Others stay.
 std::string PlainText(std::string_view text);
 
-/// Where the locale cannot show Unicode: what is written to stdout and stderr becomes PlainText.
+/// Makes PlainText of what is written to stdout and stderr where the locale cannot show Unicode.
 /// Call once, before anything is written.
 void UsePlainStreams();
 

@@ -23,7 +23,7 @@ std::vector<std::string> FlagsOf(const CLI::Option& option) {
   return flags;
 }
 
-/// Those that --help shows.
+/// The options that --help shows.
 std::vector<const CLI::Option*> OptionsOf(const CLI::App& app) {
   return app.get_options([](const CLI::Option* each) { return !each->get_group().empty(); });
 }
@@ -48,7 +48,7 @@ void ForEachCommand(const CLI::App& app, const std::string& path,
   }
 }
 
-/// For man: what would be read as a request or an escape is not.
+/// Text for man, which reads nothing of it as a request or an escape.
 std::string Roff(const std::string& text) {
   std::string result;
   bool begin = true;
@@ -66,7 +66,7 @@ std::string Roff(const std::string& text) {
   return result;
 }
 
-/// In single quotes of a shell.
+/// Text in a shell's single quotes.
 std::string Quoted(const std::string& text) {
   std::string result = "'";
   for (const char c : text) {

@@ -102,7 +102,7 @@ int RunBenchmark(const BenchmarkArguments& arguments) {
     const std::string& name = benchmark.part(i).name();
     if (wanted.empty() || std::ranges::find(wanted, name) != wanted.end()) indexes.push_back(i);
   }
-  // All of them, before an hour's work begins, and before anything is written.
+  // All parts are checked before an hour's work begins, and before anything is written.
   {
     const TemporaryDir tried("poise-benchmark");
     set.Write(tried.path());

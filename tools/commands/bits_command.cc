@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 using logging::ChannelBits;
 using nlohmann::ordered_json;
 
-/// Other bits, and another compiler, library or instruction set than the record's.
+/// The bits differ, made by another compiler, library or instruction set than the record's.
 constexpr int kExitOtherBuild = 3;
 
 struct BitsArguments {

@@ -9,7 +9,7 @@ namespace poise {
 inline constexpr int kExitOk = 0;
 inline constexpr int kExitFailed = 1;  ///< a check or the run failed
 inline constexpr int kExitUsage = 2;   ///< wrong usage or configuration
-/// In real time: nothing failed but what the machine was too late for, or an injected fault took.
+/// In real time: nothing failed but by a machine that was too late, or by an injected fault.
 inline constexpr int kExitMachine = 3;
 
 /// What the parsed command line asks for; returns the exit code.

@@ -83,7 +83,7 @@ Finding CheckBuffers() {
 }
 
 Finding CheckScheduler() {
-  // In a child: this process keeps its scheduling.
+  // A child tries it: this process keeps its scheduling.
   const pid_t child = fork();
   if (child == 0) {
     sched_param parameter{};

@@ -70,7 +70,7 @@ int CompareEstimators(const EstimatorsOptions& options) {
     }
     RunSpec spec = run.spec;
     ChangeConfigurations(options.set, &spec);
-    // Both methods again, also the one that ran: the configuration may be another.
+    // Both methods run again, also the one that ran: the configuration may be another.
     run.estimator = {};
     for (const auto& [method, name_of_method, prefix] : kMethods) {
       Reestimated result = Reestimate(spec, method, run);

@@ -53,7 +53,8 @@ Line LineTo(const std::filesystem::path& run, OperatorAct::Kind kind) {
 int DoAll(std::vector<Line>& lines, OperatorAct::Kind kind) {
   OperatorAct act;
   act.kind = kind;
-  // All first: no run waits for another's answer, or for what keeps another from being asked.
+  // All runs are told before an answer is awaited: no run waits for another's answer, or for what
+  // keeps another from being asked.
   for (Line& line : lines) {
     try {
       line.port->Do(act);

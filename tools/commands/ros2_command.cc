@@ -17,7 +17,8 @@
 namespace poise {
 namespace {
 
-// Between looks at the bus: far from filling its buffer, and few wake-ups beside the run.
+// The pause between two looks at the bus: too short for its buffer to fill, and few wake-ups beside
+// the run.
 constexpr std::chrono::milliseconds kRos2Pause{4};
 constexpr std::chrono::milliseconds kRos2Silence{500};  // then it is asked whether the run goes on
 constexpr std::chrono::milliseconds kRos2Patience{60'000};  // until the run has begun

@@ -75,7 +75,7 @@ int Prune(const PruneOptions& options) {
     const int64_t freed = RemoveRun(RunDir(run.dir));
     std::error_code error;
     const bool left = fs::exists(run.dir, error);
-    // Of a folder of several runs, when the last has gone.
+    // A folder of several runs goes when the last of them has gone.
     if (!left && run.dir.parent_path() != RunsDir()) fs::remove(run.dir.parent_path(), error);
     fmt::print("deleted {}, {}{}\n", logging::ForTerminal(run.dir.string()), FormatBytes(freed),
                left ? "; what no run has written stays" : "");

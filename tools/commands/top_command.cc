@@ -41,7 +41,7 @@ class Watch {
 
   const LiveRun& live() const { return live_; }
 
-  /// Until `deadline`, ns, but not for longer than kLongestWait.
+  /// Receives until `deadline`, ns, but not for longer than kLongestWait.
   void Spin(int64_t deadline) {
     const int64_t wait = std::max<int64_t>(0, deadline - NowNanoseconds()) / kMillisecond;
     live_.Spin(static_cast<int>(std::min(wait, kLongestWait)), [&](const LiveMessage& message) {

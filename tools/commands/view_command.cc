@@ -32,7 +32,8 @@ using std::chrono::milliseconds;
 
 constexpr const char* kLogCommand = "poise report";
 constexpr milliseconds kPicture{33};
-// Between looks at the bus: far from filling its buffer, and few wake-ups beside the run.
+// The pause between two looks at the bus: too short for its buffer to fill, and few wake-ups beside
+// the run.
 constexpr milliseconds kPause{4};
 constexpr milliseconds kViewSilence{500};  // then it is asked whether the run goes on
 constexpr milliseconds kViewPatience{5'000};

@@ -128,8 +128,8 @@ class FoxgloveServer::Impl : public LocalServer {
   const std::string info_;
   const Text advertisement_;
   std::vector<bool> keeps_;     // by topic: later subscribers get its last message as well
-  std::vector<bool> precedes_;  // likewise: the scene's, few and small beside the bus's
-  std::vector<Kept> kept_;      // likewise
+  std::vector<bool> precedes_;  // by topic: the scene's, few and small beside the bus's
+  std::vector<Kept> kept_;      // by topic
   int64_t dropped_ = 0;
 };
 
@@ -198,7 +198,7 @@ class FoxgloveServer::Impl::Client : public LocalClient {
     Queue({server_->info_, nullptr, false});
     Queue({"", server_->advertisement_, false});
   }
-  /// Who asks more than it takes waits.
+  /// A client that asks for more than it takes waits.
   bool Reads() const override { return !IsFull(1); }
   void Written() override {
     queued_bytes_ -= on_its_way_;

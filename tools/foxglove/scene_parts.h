@@ -31,12 +31,13 @@ void Fill(const SceneColor& from, foxglove::Color* to);
 /// A thing in the scene that takes the place of an earlier one of that id; it stays until then.
 foxglove::SceneEntity* AddEntity(int64_t utime, std::string_view frame, std::string_view id,
                                  foxglove::SceneUpdate* scene);
-/// From `start` along `vector` (m). Nothing where the vector is shorter than a millimetre.
+/// Adds an arrow from `start` along `vector` (m); none where the vector is shorter than a
+/// millimetre.
 void AddArrow(const Eigen::Vector3d& start, const Eigen::Vector3d& vector, double diameter,
               const SceneColor& color, foxglove::SceneEntity* entity);
 void AddSphere(const Eigen::Vector3d& centre, double diameter, const SceneColor& color,
                foxglove::SceneEntity* entity);
-/// A closed line. Nothing of fewer than two points.
+/// Adds a closed line; none through fewer than two points.
 void AddLoop(std::span<const Eigen::Vector3d> points, double thickness, const SceneColor& color,
              foxglove::SceneEntity* entity);
 

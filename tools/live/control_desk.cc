@@ -14,7 +14,7 @@ using ActKind = OperatorAct::Kind;
 using ActState = OperatorAct::State;
 
 constexpr size_t kShown = 24;  // acts that pages are told of
-// Of the robot's weight, what a page may push with: more than any robot here stands, and no slip of
+// A page may push with this share of the robot's weight: no robot here stands more, and no slip of
 // a hand tears one apart.
 constexpr double kPushShare = 0.5;
 constexpr double kLongestPush = 2;    // s: a page that wants more asks again

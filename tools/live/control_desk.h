@@ -1,4 +1,4 @@
-// Between the pages that may act and the one who carries their acts.
+// Stands between the pages that may act and the one who carries their acts.
 #pragma once
 
 #include <cstdint>

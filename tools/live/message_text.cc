@@ -163,7 +163,7 @@ bool Thinner::Pass(double time) {
   if (period_ == 0) return true;
   // A time far before the next is another run in the same log.
   if (begun_ && time < next_ && time > next_ - 2 * period_) return false;
-  // On the grid of the first one while that holds, so that the rate is met on average.
+  // Times stay on the grid of the first one while that holds, so that the rate is met on average.
   next_ = begun_ && time >= next_ && time < next_ + period_ ? next_ + period_ : time + period_;
   begun_ = true;
   return true;

@@ -155,7 +155,7 @@ void TickRing::Add(const LiveMessage& message) {
   if (tick < 0 || tick > kMaxTick || (planned_ > 0 && tick >= planned_)) return;
   if (newest_ < 0) Start(tick);
   if (tick >= end_ + kReceiveWindow) {
-    // After a long pause of this process; one stray packet moves nothing.
+    // A tick is so far ahead after a long pause of this process; one stray packet moves nothing.
     const bool confirmed = jump_ >= 0 && std::abs(tick - jump_) <= kMaxLead;
     jump_ = confirmed ? -1 : tick;
     if (!confirmed) return;

@@ -37,7 +37,7 @@ class TickRing {
   /// A message of LiveRun; HEALTH_* is passed over. One of an external channel stands at the newest
   /// tick that is not taken.
   void Add(const LiveMessage& message);
-  /// At the run's end: takes the last ticks as they are.
+  /// Takes the last ticks as they are, at the run's end.
   void Finish();
 
   /// Ticks held: [first_tick, end_tick).

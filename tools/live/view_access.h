@@ -20,7 +20,7 @@ std::optional<ViewTarget> ReadTarget(std::string_view target);
 
 /// 128 random bits from the system, in hexadecimal digits. Throws std::system_error.
 std::string MakeToken();
-/// In a time that tells nothing of where they differ.
+/// Compares in a time that tells nothing of where they differ.
 bool SameToken(std::string_view given, std::string_view token);
 
 }  // namespace poise

@@ -43,7 +43,7 @@ class ViewServer {
   void SetState(std::string json);
   /// A further text for every client, likewise; none until it is set.
   void SetStatus(std::string json);
-  /// And a third, of what pages may do and have done.
+  /// A third text for every client: what pages may do and have done.
   void SetControl(std::string json);
   /// The ring's ticks are others than before, from its first on: all clients get them.
   void Restart();

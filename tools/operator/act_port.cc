@@ -25,7 +25,8 @@ using operate::act_t;
 using operate::answer_t;
 using ActKind = OperatorAct::Kind;
 
-// Without an answer. A stop is under way when the first of them is: what is more is one hand.
+// At most so many acts and stops wait for an answer. A stop is under way when the first of them is:
+// what is more comes of one hand.
 constexpr std::ptrdiff_t kMostActs = 128, kMostStops = 32;
 
 /// -1: the graph has none.

@@ -82,13 +82,13 @@ class ActPort {
   /// The kind of the act that it answers, anyone's; 0: it is no answer.
   int8_t HearAnswer(std::span<const uint8_t> data);
   void HearStatus(std::span<const uint8_t> data);
-  /// Of what waits by that id, if it does. `reason` empty: it is accepted.
+  /// Answers what waits by that id, if anything does. `reason` empty: it is accepted.
   void Answer(int64_t id, int64_t tick, std::string reason);
-  /// All that wait of a kind.
+  /// Refuses all acts of a kind that wait.
   void Refuse(OperatorAct::Kind kind, const std::string& reason);
 
   const int act_channel_, answer_channel_;   // -1: there is none
-  const int stop_channel_, status_channel_;  // likewise
+  const int stop_channel_, status_channel_;  // -1: there is none
   std::vector<Waiting> waiting_;
   int64_t next_id_ = 1;
   int64_t resets_ = -1;  // as the bridge told last; -1: it has not

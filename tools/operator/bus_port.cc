@@ -131,7 +131,7 @@ void BusPort::Carry(Waiting* waiting, int64_t now) {
     if (tick_ < 0) return;
     if (waiting->sent == 0) {
       const double heard = static_cast<double>(tick_time_ - first_time_) * 1e-9;
-      // As fast as the run has gone; at first as real time.
+      // The run goes on as fast as it has gone; at first as real time.
       const double rate = heard > 0.05 ? static_cast<double>(tick_ - first_tick_) / heard
                                        : 1 / spec().tick_period();
       const double since = static_cast<double>(now - tick_time_) * 1e-9;

@@ -30,7 +30,7 @@ class InlinePort final : public ActPort {
   /// It wants the messages of this channel: answers, and what the bridge does.
   bool Hears(int channel) const { return channel == answer_channel_ || channel == status_channel_; }
   void Hear(int channel, std::span<const uint8_t> data);
-  /// Before a tick of a fresh runner: injects what was injected before that tick.
+  /// Injects, before a tick of a fresh runner, what was injected before that tick.
   void Repeat(int64_t tick);
   /// Forgets what was injected before `tick` or a later one.
   void Forget(int64_t tick);

@@ -22,7 +22,7 @@ class MachineLoadSampler {
   MachineLoadSampler();
   /// To be called often, `now`: ns. Reads ten times a second.
   void Sample(int64_t now);
-  /// So far.
+  /// The load of all samples so far.
   MachineLoad Load() const;
 
  private:

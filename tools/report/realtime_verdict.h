@@ -39,7 +39,7 @@ std::string CauseOfLateness(const RunOutcome& outcome);
 std::string FormatRealtime(const RunSpec& spec, const RunOutcome& outcome,
                            const std::vector<CheckResult>& checks, const LostTicks& lost);
 
-/// The same for summary.json; null of a run that was not in real time.
+/// FormatRealtime for summary.json; null of a run that was not in real time.
 nlohmann::ordered_json RealtimeJson(const RunSpec& spec, const RunOutcome& outcome,
                                     const LostTicks& lost);
 

@@ -85,8 +85,8 @@ nlohmann::ordered_json RunJson(const Scenario& scenario, const logging::RunRecor
 /// Ticks of the scenario in which the bridge did not follow a command, of a run in real time.
 struct LostTicks {
   int64_t ticks = 0;
-  /// For want of a command in time, while the controller gave none that was wrong: the machine was
-  /// late, or a fault was injected.
+  /// Ticks of these that had no command in time, while the controller gave none that was wrong: the
+  /// machine was late, or a fault was injected.
   int64_t late = 0;
 };
 

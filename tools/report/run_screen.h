@@ -28,7 +28,7 @@ struct ShownRun {
 /// such: its own checks), each with its limit.
 std::string FormatScreen(const ShownRun& run);
 
-/// The same with every row, the events and the assumptions.
+/// FormatScreen with every row, the events and the assumptions.
 std::string FormatFullScreen(const ShownRun& run);
 
 /// The physics engine of the run's simulated robot with all that it alone is told, the step and the
@@ -40,8 +40,8 @@ std::string FormatEngine(const Scenario& scenario, const Graph& graph);
 /// `problem`: what else made the run fail; empty when nothing did.
 std::string FormatVerdict(const std::vector<CheckResult>& checks, const std::string& problem);
 
-/// The same for a person: what failed, and what is not known for want of what, by name in lines of
-/// its own, in colour; how many of the checks the short table above shows.
+/// FormatVerdict for a person, in colour: lines of their own name what failed, and what is not
+/// known for want of what; then how many of the checks the short table above shows.
 std::string FormatVerdictLines(const Scenario& scenario, const std::vector<CheckResult>& checks,
                                const std::string& problem, bool below_full_table);
 

@@ -183,7 +183,7 @@ bool ComWasMoved(const RunRecord& run) {
   bool known = false;
   for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
     const support_plan_t* const plan = run.plan.at(tick);
-    // None in steps, which a centre of pressure leads.
+    // In steps, which a centre of pressure leads, the COM has no reference.
     if (plan == nullptr || plan->com_follows != support_plan_t::FOLLOWS_REFERENCE) continue;
     for (size_t i = 0; i < 2; ++i) {
       const double x = plan->com_reference.position[i];
@@ -214,7 +214,8 @@ bool BridgeFollows(const RunRecord& run) {
   return true;
 }
 
-/// Where the bridge no longer followed though the robot did not fall, an emergency stop for one.
+/// Tells that the bridge no longer followed though the robot did not fall, as after an emergency
+/// stop.
 std::string BridgeTrouble(const std::vector<Event>& events) {
   for (const Event& event : events) {
     if (event.name != "bridge_state" || !event.detail.starts_with("running")) continue;
@@ -258,7 +259,7 @@ std::string Figures(const RunRecord& run, const std::vector<CheckResult>& checks
     figure.name = name;
     figure.unit = metric->unit;
     figure.measured = metric->compute(run);
-    // Nobody asks for how long what never was on was on.
+    // Balancing that was never on has no time to tell of.
     const bool nothing = figure.name == "balancing_active" && figure.measured == 0.0;
     if (figure.measured && !nothing && parts.size() < kFigures) {
       parts.push_back(Figure(figure, moved));

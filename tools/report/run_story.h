@@ -12,7 +12,7 @@
 
 namespace poise {
 
-/// Where the run's end was not the planned one: why, as its components say; empty when none does.
+/// Why the run ended other than planned, as its components say; empty when none does.
 std::string EndReason(const logging::RunRecord& run);
 
 /// What happened to the robot, and by which steps; then what led to its fall, or else its figures,

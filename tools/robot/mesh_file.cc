@@ -218,7 +218,7 @@ MeshTriangles Simplified(MeshTriangles mesh, size_t most) {
     fewer.resize(count);
     mesh.indices = std::move(fewer);
   }
-  // Only the vertices that are left.
+  // Vertices that no triangle has any more are dropped.
   std::vector<uint32_t> remap(mesh.vertices.size());
   const size_t count = meshopt_optimizeVertexFetchRemap(remap.data(), mesh.indices.data(),
                                                         mesh.indices.size(), mesh.vertices.size());

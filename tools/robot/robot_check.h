@@ -21,7 +21,8 @@ struct JointLoad {
   double limit = 0;           ///< TorqueLimit
   double rated = 0;           ///< at the motor's rated current
   double double_support = 0;  ///< in the stance
-  /// On one foot, the COM above its sole's origin: the worse of the two. NaN: no posture.
+  /// The worse of the two feet, where the robot stands on one, the COM above its sole's origin.
+  /// NaN: it has no posture.
   double single_support = 0;
   double step = 0;            ///< the largest in a step (LoadsOfAStep); NaN: it has none
   double step_rms = 0;        ///< N·m, root of the mean square of steps; NaN likewise

@@ -145,7 +145,7 @@ std::optional<StepLoads> LoadsOfAStep(const robot::RobotModel& model, const Robo
   for (const robot::Foot foot : robot::kFeet) {
     const auto states = step.States(foot);
     if (!states) return {};
-    // At the ends a difference to one side alone is known: half a sample off.
+    // The ends are left out: a difference to one side alone is known there, half a sample off.
     for (size_t i = 1; i + 1 < states->size(); ++i) {
       const RobotState& state = (*states)[i];
       const VectorXd acceleration =

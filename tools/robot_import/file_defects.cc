@@ -134,7 +134,7 @@ class Repairer {
       const bool effort = !(joint.effort > 0) || !std::isfinite(joint.effort);
       const bool velocity = !(joint.velocity > 0) || !std::isfinite(joint.velocity);
       if (joint.kind == JointKind::kRevolute && !(joint.lower < joint.upper)) {
-        // Half a turn to either side, which no leg's joint leaves.
+        // The joint gets half a turn to either side, which no leg's joint leaves.
         JointLimit* const limit = result_.robot.add_limit();
         limit->add_joint(joint.name);
         limit->set_lower(-M_PI);

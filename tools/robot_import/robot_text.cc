@@ -30,7 +30,7 @@ std::string Block(const std::string& name, const Message& message) {
   const std::string line = OneLiner(message);
   if (name.size() + line.size() + 5 <= kColumns) return fmt::format("{} {{ {} }}\n", name, line);
   std::string text = name + " {\n", row = " ";
-  // Between fields: a blank outside of quotes and braces, before a name.
+  // Rows break between fields: at a blank outside of quotes and braces, before a name.
   int depth = 0;
   bool quoted = false;
   std::string field;

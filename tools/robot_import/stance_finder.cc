@@ -94,7 +94,7 @@ void BendLeg(const RobotModel& model, const Anatomy& anatomy, robot::Foot foot, 
   (*joints)[ankle.joint] -= ankle.sign * (turn + lean + std::atan2(-toe.z(), toe.x()));
 }
 
-/// With that spacing, m.
+/// The stance with soles that are `spacing` apart, m.
 FoundStance StanceAt(const RobotModel& model, const Anatomy& anatomy,
                      const Eigen::VectorXd& nominal, bool bend_knees, double spacing) {
   std::string problem;

@@ -14,8 +14,9 @@ struct FoundStance {
   robot::RobotState state;         ///< the exact ones, feet on z = 0
   double com_height = 0;           ///< m above the soles
   double foot_spacing = 0;         ///< m, between the soles' centres
-  /// Where it is less than the nominal posture's: that one, m, and the joint that bears too much on
-  /// one foot there, with its torque over its limit (infinite: it cannot stand on one foot).
+  /// Where it is less than the nominal posture's spacing: that spacing, m, and the joint that bears
+  /// too much on one foot there, with its torque over its limit (infinite: it cannot stand on one
+  /// foot).
   double wider_spacing = 0;
   int strained = -1;
   double strain = 0;

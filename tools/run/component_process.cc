@@ -48,7 +48,7 @@ ComponentProcess::~ComponentProcess() {
 
 void ComponentProcess::Watch() {
   if (pidfd_ >= 0) close(pidfd_);
-  // Without it (an old kernel) a death is only seen later.
+  // Without this descriptor (an old kernel) a death is only seen later.
   pidfd_ = static_cast<int>(syscall(SYS_pidfd_open, process_->pid(), 0));
 }
 

@@ -37,7 +37,7 @@ class ComponentProcess {
 
   ChildProcess& process() { return *process_; }
   const std::string& name() const { return name_; }
-  /// Those that it runs, by their names in the graph; the recorder for its own.
+  /// The components that it runs, by their names in the graph; of the recorder its own name.
   const std::vector<std::string>& components() const { return components_; }
   bool restarts() const { return restart_; }
   int32_t takeovers() const { return takeovers_; }

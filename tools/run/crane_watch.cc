@@ -16,7 +16,7 @@ void CraneWatch::Receive() {
     held_ = held_ || truth.crane_share > 0;
     const bool free = truth.crane_share == 0;
     if (held_ && free) let_go_ = MakeTick(truth.tick, period_, lead_).time;
-    // Without a crane the first message tells.
+    // Without a crane the first message tells that there is nothing to watch.
     if (free) tap_.reset();
   }
 }

@@ -65,7 +65,7 @@ class InlineWatch {
       const int64_t tick = position_.tick.load(std::memory_order_relaxed);
       const auto stages = static_cast<int64_t>(stages_.size());
       const int64_t stood = watch.Stood(tick * (stages + 1) + stage, NowNanoseconds());
-      // Between the stages it writes the log: there the disk is waited for.
+      // Between the stages the run writes its log: to wait for the disk there is no stall.
       if (stage != RunPosition::kNoStage && stood > kStallPatience) End(tick, stage);
     }
   }

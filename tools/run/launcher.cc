@@ -71,7 +71,8 @@ void Launcher::StartProcesses() {
           {"recorder", "--run", files_.spec_file, "--scenario", files_.scenario_file, "--log",
            files_.run_dir + "/run.lcm", "--report", files_.run_dir + "/recorder.json"});
   }
-  // In lockstep a successor would lack the messages of its tick; and the run can be repeated.
+  // No process has a successor in lockstep, which would lack the messages of its tick; and the run
+  // can be repeated.
   const Graph& graph = spec_.graph();
   for (const std::string& process : ProcessNames(graph)) {
     std::vector<std::string> names;

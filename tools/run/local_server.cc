@@ -83,8 +83,8 @@ void LocalClient::Start() {
 
 void LocalClient::Check() {
   const Request& request = parser_.get();
-  // Of these there may be but one: where a request goes and comes from must not depend on who reads
-  // it (RFC 9112, 3.2).
+  // Each of these headers may come once: where a request goes and comes from must not depend on who
+  // reads it (RFC 9112, 3.2).
   const bool ambiguous = request.count(http::field::host) > 1 ||
                          request.count(http::field::origin) > 1 ||
                          request.count(http::field::sec_websocket_key) > 1;

@@ -34,7 +34,7 @@ class LocalClient : public std::enable_shared_from_this<LocalClient> {
   /// Ends it at once.
   void Close();
   bool streaming() const { return streaming_; }
-  /// Has taken nothing for 5 s of what was written.
+  /// Whether it has taken nothing for 5 s of what was written.
   bool stuck() const;
   Clock::time_point came() const { return came_; }
 
@@ -48,13 +48,13 @@ class LocalClient : public std::enable_shared_from_this<LocalClient> {
 
   /// A request that this machine's own programs or pages have sent: Respond or Upgrade.
   virtual void Answer(const Request& request) = 0;
-  /// It has become a WebSocket.
+  /// Called when it has become a WebSocket.
   virtual void Opened() = 0;
   /// A message; false: none of ours sends it, and the connection ends.
   virtual bool Take(std::string_view message, bool text) = 0;
   /// Whether the next message is read already; Receive goes on.
   virtual bool Reads() const { return true; }
-  /// What was written is on its way.
+  /// Called when what was written is on its way.
   virtual void Written() = 0;
 
   /// Sends it and closes.
@@ -104,14 +104,14 @@ class LocalServer {
   int port() const { return port_; }
   /// Sends, receives and accepts for this long.
   void RunFor(std::chrono::milliseconds duration) { io_.run_for(duration); }
-  /// The same of what can be without waiting.
+  /// Sends, receives and accepts what it can without waiting.
   void Poll() { io_.poll(); }
   /// Why a page of this origin may not connect; empty: it may.
   virtual std::string WhyForeign(std::string_view origin) const = 0;
 
  protected:
   virtual std::shared_ptr<LocalClient> MakeClient(boost::asio::ip::tcp::socket socket) = 0;
-  /// To be copied where one may end meanwhile.
+  /// Whoever goes through them copies the set where one may end meanwhile.
   const std::set<std::shared_ptr<LocalClient>>& clients() const { return clients_; }
 
  private:

@@ -50,7 +50,7 @@ fs::path FindRun(const std::string& run) {
 
 namespace {
 
-/// For who stands where nothing can be written: $XDG_STATE_HOME/poise/runs, or below
+/// The folder of runs where the usual one cannot be written: $XDG_STATE_HOME/poise/runs, or below
 /// ~/.local/state; empty without a home.
 fs::path StateRuns() {
   const char* const state = std::getenv("XDG_STATE_HOME");

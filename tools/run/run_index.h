@@ -20,7 +20,7 @@ struct PastRun {
   int64_t bytes = 0;               ///< of all that the folder holds
 };
 
-/// Those of matrices, sweeps and the like as well, each by itself; the newest first.
+/// All past runs, those of matrices, sweeps and the like by themselves; the newest first.
 std::vector<PastRun> PastRuns();
 
 /// A table of them, folders as seen from RunsDir().

@@ -169,14 +169,14 @@ std::vector<fs::path> RegistryDirs() {
     return {dir};
   }
   std::vector<fs::path> dirs;
-  // That of another user stays in the environment of `sudo -E` and `su`.
+  // `sudo -E` and `su` leave another user's folder in the environment: it is passed over.
   const auto add = [&](const fs::path& own) {
     if (!own.is_absolute() || !BelongsTo(own, geteuid())) return;
     const fs::path dir = own / "poise";
     if (std::find(dirs.begin(), dirs.end(), dir) == dirs.end()) dirs.push_back(dir);
   };
   if (const char* const xdg = std::getenv("XDG_RUNTIME_DIR"); xdg != nullptr) add(xdg);
-  // Also when the environment does not tell, as under cron.
+  // It counts also when the environment does not tell it, as under cron.
   add(fmt::format("/run/user/{}", geteuid()));
   dirs.push_back(SharedDir(geteuid()));
   return dirs;

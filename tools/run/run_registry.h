@@ -68,7 +68,7 @@ RunningRun OnlyRunningRun(std::string_view log_command, std::string_view command
 /// whose folder's last part, scenario or number it is, this user's before others'; else the folder
 /// or file, if there is one. Throws ConfigError when there is none.
 std::vector<std::filesystem::path> RunsNamed(const std::string& name);
-/// The same of a command that takes one; throws ConfigError also when `name` means several.
+/// RunsNamed for a command that takes one run; throws ConfigError also when `name` means several.
 std::filesystem::path RunNamed(const std::string& name, std::string_view command);
 
 /// $POISE_RUNTIME_DIR alone, or below both $XDG_RUNTIME_DIR, which ends with the user's last login,

@@ -26,8 +26,8 @@ struct RunOptions {
   bool force = false;  ///< replace what the folder holds; start where the log may not fit
   LaunchOptions launch;
   bool ros2 = false;  ///< `poise ros2` listens to the run of processes, and ends with it
-  /// Runs in this process in place of RunInline, into the log named; empty: none does. For who
-  /// lets a page control it.
+  /// Runs in this process in place of RunInline and writes the log named, for a caller that lets a
+  /// page control it; empty: RunInline does.
   std::function<RunOutcome(const RunSpec& spec, const Scenario& scenario,
                            const std::string& scenario_text, const std::string& log)>
       interactive;
@@ -58,7 +58,7 @@ class ScenarioRun {
   const RunSpec& spec() const { return main_.spec; }
   const std::string& name() const { return main_.spec.scenario(); }
   const Scenario& scenario() const { return main_.loaded.scenario; }
-  /// Its log's, and its reference's.
+  /// What its log and its reference's will take.
   LogSizes log_sizes() const;
 
  private:

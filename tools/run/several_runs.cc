@@ -35,7 +35,8 @@ std::vector<int64_t> SectionNumbers(std::string_view section) {
 std::vector<std::string> Experiments() {
   std::vector<std::pair<std::vector<int64_t>, std::string>> found;  // sections and files
   for (const std::string& name : ListNames("scenarios")) {
-    // By its path: a file of that name in the current folder is not the experiment.
+    // The scenario is read by its path: a file of that name in the current folder is not the
+    // experiment.
     const std::string file = InstalledFile("scenarios", name).string();
     const Scenario scenario = ScenarioFiles(file).Merged();
     if (!scenario.paper_section().empty()) {

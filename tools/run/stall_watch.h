@@ -36,9 +36,9 @@ class StallWatch {
   int64_t stood_ = 0;      // ns
 };
 
-/// For how long a process has said nothing though it could have. Asked again and again; of the time
-/// between two questions neither what the process waited for a processor counts, nor more than
-/// kLongestLook (StallWatch).
+/// Measures for how long a process has said nothing though it could have. It is asked again and
+/// again: of the time between two questions neither what the process waited for a processor counts,
+/// nor more than kLongestLook (StallWatch).
 class SilenceWatch {
  public:
   /// How long process `pid` has been silent, its last word heard at `heard`; a successor has said

@@ -30,7 +30,8 @@ std::optional<std::filesystem::path> LookForFile(const std::string& kind, const 
                                                  const std::filesystem::path& beside,
                                                  BaseFiles bases = BaseFiles::kRefused);
 
-/// The same. Throws ConfigError naming the paths that were searched, and names that are near.
+/// LookForFile of a file that must be there. Throws ConfigError naming the paths that were
+/// searched, and names that are near.
 std::filesystem::path FindFile(const std::string& kind, const std::string& name,
                                const std::filesystem::path& beside,
                                BaseFiles bases = BaseFiles::kRefused);

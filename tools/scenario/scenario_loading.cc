@@ -44,7 +44,7 @@ std::string WrittenPath(const FieldChange& change) {
   return change.set.substr(0, change.set.find('='));
 }
 
-/// With indexes for elements' names, as the checks below name fields.
+/// A change's path with indexes for elements' names, as the checks below name fields.
 std::string PathOf(const LoadedScenario& loaded, const FieldChange& change) {
   try {
     return ResolvePath(loaded.scenario, WrittenPath(change));
@@ -151,7 +151,7 @@ void CheckScenario(const LoadedScenario& loaded) {
       FailLimits(loaded, i);
     }
   }
-  // As the files have it: an ablation may have cleared what an assumption is about.
+  // A field of the files counts, too: an ablation may have cleared what an assumption is about.
   const Scenario files = s.assumption_size() > 0 ? loaded.files.Merged() : Scenario();
   for (int i = 0; i < s.assumption_size(); ++i) {
     const Assumption& assumption = s.assumption(i);
@@ -175,7 +175,7 @@ bool HasOwnChecks(const LoadedScenario& loaded) {
 std::string Describe(const LoadedScenario& loaded, const FieldChange& change,
                      std::string_view field, std::string_view problem) {
   if (change.by == kSetFlag) {
-    // As the user wrote it: with the element's name.
+    // The user reads the path as it was written: with the element's name.
     const std::string path = PathOf(loaded, change);
     const bool inside = field.starts_with(path);
     const std::string rest(inside ? field.substr(path.size()) : "");
@@ -239,7 +239,7 @@ void CheckReference(const LoadedScenario& loaded) {
   }
 }
 
-/// Their names, and that of the reference.
+/// Checks the variants' names, and that of the reference.
 void CheckVariants(const LoadedScenario& loaded) {
   const std::vector<std::string> names = VariantNames(loaded.scenario);
   for (size_t i = 0; i < names.size(); ++i) {

@@ -37,7 +37,7 @@ class LimitSearch {
   /// False when something above a value that was not survived was; empty: not known, for runs that
   /// do not tell.
   std::optional<bool> monotone() const;
-  /// Something above a value that was not survived was.
+  /// Whether something above a value that was not survived was.
   bool survived_again() const { return monotone() == std::optional(false); }
   /// Runs that one monotone boundary takes.
   static int ExpectedRuns(const Limit& limit);

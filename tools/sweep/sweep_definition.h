@@ -52,7 +52,7 @@ class SweepDefinition {
 
  private:
   struct Source;
-  /// That every field that varies is one, each by itself.
+  /// Checks of every field that varies, by itself, that the scenario has it and takes its value.
   void CheckFields(const Source& source, Scenario scenario,
                    const std::optional<double>& limit) const;
   void SetColumns(const Source& source, const Scenario& scenario);

@@ -96,7 +96,7 @@ void AddSweepOptions(CLI::App* app, SweepArguments* arguments, SessionOptions* s
                         const char* type) {
     return app->add_option(flag, *to, text)->type_name(type)->allow_extra_args(false)->take_all();
   };
-  // Not required: CLI11 would take a subcommand's name for it.
+  // It is not marked as required: CLI11 would take a subcommand's name for it.
   app->add_option("sweep", arguments->what,
                   "name of deploy/sweeps, or a .pbtxt file; or a scenario with --vary");
   list("--vary", &arguments->vary,

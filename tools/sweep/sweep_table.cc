@@ -58,7 +58,7 @@ std::string SweepCsv(const SweepHeader& header, const SweepRows& rows) {
   for (const auto& [key, row] : rows) {
     std::vector<std::string> cells = Place(points, row.run);
     if (limit) cells.push_back(Cell(row.limit));
-    // When a run ended is not known where it does not tell.
+    // A run that does not tell when it ended leaves the cell empty.
     const bool ended = row.survived() || row.ended_at != 0;
     cells.insert(cells.end(),
                  {row.outcome, Cell(row.fell_at), ended ? fmt::format("{}", row.ended_at) : "",

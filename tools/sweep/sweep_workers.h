@@ -25,12 +25,12 @@ struct RunPlace {
 /// What a task shows its owner while it works, in memory that they share.
 class TaskStatus {
  public:
-  /// Its owner waits without an end: whoever works for the task watches itself.
+  /// Has its owner wait without an end: whoever works for the task watches itself.
   void SetWatchedElsewhere() { elsewhere_.store(true); }
   /// Stages by their index in `position`, as many as there is room for; period in s, lead in ticks.
   void SetRun(const std::vector<std::pair<std::string, std::string>>& stages, double period,
               int64_t lead);
-  /// That it goes on, where no ticks tell.
+  /// Tells that the task goes on, where no ticks do.
   void Step() { steps_.fetch_add(1); }
   RunPosition* position() { return &position_; }
 
@@ -73,8 +73,8 @@ class ForkedTasks {
   /// `work` gives the answer; what it throws is its problem. Precondition: not full(). Throws
   /// std::system_error.
   void Start(int64_t id, const std::function<std::string(TaskStatus*)>& work);
-  /// Those that have ended, or hang and are ended now, after waiting at most `milliseconds` for the
-  /// first one.
+  /// Waits at most `milliseconds` for the first one that ends. Returns those that have ended, and
+  /// those that hang, which it ends.
   std::vector<Result> Wait(int milliseconds);
 
  private:

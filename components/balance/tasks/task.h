@@ -101,11 +101,12 @@ struct TaskType {
 /// A file NAME_task.cc of this folder that defines MakeNameTask (MakeTask) is a type of its own.
 const std::vector<TaskType>& TaskTypes();
 
-/// By `spec.type` from `types`; throws std::invalid_argument for one that is not there.
+/// Makes a task of the type `spec.type` of `types`; throws std::invalid_argument for one that is
+/// not there.
 std::unique_ptr<Task> CreateTask(const TaskSpec& spec, const robot::RobotModel& model,
                                  const std::vector<TaskType>& types = TaskTypes());
 
-// For types.
+// What follows helps types to compute their tasks.
 
 /// Smallest rotation vector from `actual` to `desired`, rad, in the axes both are given in.
 Eigen::Vector3d OrientationError(const Eigen::Matrix3d& desired, const Eigen::Matrix3d& actual);

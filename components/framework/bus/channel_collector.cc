@@ -70,7 +70,7 @@ class ChannelCollector::Impl {
   void Deliver(Lane& lane, int64_t now);
   void ReceiveService();
   void Request(int64_t now);
-  /// In real time a component may skip ticks: goes on without what nobody can send.
+  /// Goes on without what nobody can send any more: in real time a component may skip ticks.
   void GiveUp(Lane& lane, int64_t now, int64_t expected);
   void PublishHealth(int64_t now);
 

@@ -38,7 +38,7 @@ class ControlClient {
     int64_t last_seen = 0;  ///< ns, steady clock
     health_t health;        ///< valid when seen
   };
-  /// By component name; holds every watched name from the start.
+  /// What was heard of each component, by name; every watched one is there from the start.
   const std::map<std::string, Status>& statuses() const { return statuses_; }
   /// True when every watched process has been seen in a state >= `state` (health_t::STATE_*).
   bool AllReached(int8_t state) const;

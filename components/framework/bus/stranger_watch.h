@@ -34,8 +34,8 @@ class StrangerWatch {
 
   /// Counts what has come. True when anything has.
   bool Look();
-  /// By channel and source, as they first came; at most kMostStrangers, and one without a source
-  /// for what came from others still.
+  /// Strangers by channel and source, as they first came: at most kMostStrangers, and one more
+  /// without a source that counts all others.
   const std::vector<Stranger>& strangers() const { return strangers_; }
 
   static constexpr size_t kMostStrangers = 64;

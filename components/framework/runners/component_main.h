@@ -14,7 +14,7 @@ namespace poise {
 /// wrong usage or configuration (one line on stderr). Ends with its parent process.
 int ComponentMain(int argc, char** argv, const ComponentType& type);
 
-/// The same of a component that this program's POISE_MODULE adds.
+/// ComponentMain of a component that this program's POISE_MODULE adds.
 int ModuleComponentMain(int argc, char** argv, const char* type, void (*module)());
 
 /// The program that runs components which share a process.

@@ -491,7 +491,7 @@ ProcessRunner::Impl::Outcome ProcessRunner::Impl::FailStage(size_t component,
 
 bool ProcessRunner::Impl::EndTick() {
   const Tick tick = MakeTick(tick_, period_, lead_);
-  // At once after the command has left: a death in between loses the tick's state.
+  // The state is kept at once after the command has left: a death in between loses it.
   if (store_ != nullptr && can_be_taken_over_) KeepState();
   bus_.SendRest();
   bus_.SendAnswers();
@@ -560,7 +560,7 @@ void ProcessRunner::Impl::Poll(int64_t deadline, int batch) {
   const int64_t now = NowNanoseconds();
   if (now >= next_health_) PublishHealth(now);
   if (timing_ == Timing::kFollower) {
-    // As far ahead as the clock's owner can have come.
+    // The clock's owner can have come as far ahead as this.
     const int64_t horizon = tick_ + kReceiveWindow - 1 + (now - progress_) / period_ns_;
     for (const auto& inbox : bus_.inboxes()) inbox->set_horizon(any_tick_ ? INT64_MAX : horizon);
   }

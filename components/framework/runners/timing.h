@@ -16,7 +16,8 @@ enum class Timing {
   kFollower,  ///< works on the newest tick that has come, skips what it is too late for
 };
 
-/// In lockstep, and in a run in real time whose graph has no owner of the clock: kLockstep for all.
+/// The timing of a component in the graph: kLockstep of all in lockstep, and in a run in real time
+/// whose graph has no owner of the clock.
 Timing TimingOf(const RunSpec& spec, int component);
 
 /// Which messages of its inputs a component of this timing takes.

@@ -74,7 +74,7 @@ void EmulatedChain::FindWay() {
     std::array<bool, kNumPorts> linked{};
     for (size_t port = 0; port < kNumPorts; ++port) {
       const int next = behind_[i][port];
-      // Beyond a cut all are together still.
+      // The slaves beyond a cut are still linked with each other.
       const bool same_side = (static_cast<size_t>(next) < connected_) == (i < connected_);
       linked[port] = next >= 0 && same_side;
     }

@@ -31,7 +31,7 @@ class EmulatedChain final : public FrameHandler {
   /// Until it is on again the chain ends before it.
   void PowerOff(size_t slave);
   void PowerOn(size_t slave);
-  /// What is switched on at a place next is another product.
+  /// Makes another product of what is switched on next at this place.
   void ChangeDevice(size_t slave, uint32_t product_code) {
     config_.mutable_drive(static_cast<int>(slave))->set_product_code(product_code);
   }
@@ -44,8 +44,8 @@ class EmulatedChain final : public FrameHandler {
   void Process(const Datagram& datagram, std::span<uint8_t> bytes, EmulatedSlave* slave,
                int64_t now);
   void LatchReceiveTimes(int64_t now);
-  /// Where a frame goes, and when, from `slave` on, which it reaches at `arrival`, ns; when it is
-  /// back.
+  /// Finds where a frame goes, and when, from `slave` on, which it reaches at `arrival`, ns.
+  /// Returns when it is back.
   int64_t Walk(size_t slave, int64_t arrival);
   void FindWay();
   std::unique_ptr<EmulatedSlave> MakeSlave(size_t slave) const;

@@ -99,7 +99,7 @@ SdoAbort ObjectDictionary::ReadComplete(ObjectAddress address, std::vector<uint8
   const int most = MaxSubindex(address.index);
   if (most < 0) return SdoAbort::kNoObject;
   if (address.subindex > 1) return SdoAbort::kUnsupportedAccess;
-  // As many as subindex 0 says, where it is that of a list.
+  // Subindex 0 of a list says how many elements there are.
   const Object* count = Find({address.index, 0});
   const bool list = most > 0 && count != nullptr && count->size == 1;
   const int last = list ? std::min(most, static_cast<int>(count->value)) : most;

@@ -68,7 +68,7 @@ class FrameBuilder {
   /// length. Returns the offset of its header; nullopt, and the frame stays, when it does not fit.
   std::optional<size_t> Add(Command command, uint8_t index, uint16_t adp, uint16_t ado,
                             std::span<const uint8_t> data);
-  /// The same with `length` zero bytes.
+  /// Adds a datagram of `length` zero bytes, as Add does.
   std::optional<size_t> AddZero(Command command, uint8_t index, uint16_t adp, uint16_t ado,
                                 size_t length);
   std::optional<size_t> AddLogical(Command command, uint8_t index, uint32_t address,

@@ -165,8 +165,9 @@ size_t RawLink::Receive(std::span<uint8_t> frame, int64_t deadline) {
                                       reinterpret_cast<sockaddr*>(&from), &from_size);
     if (received <= static_cast<ssize_t>(kEthernetHeader)) continue;
     if (from.sll_pkttype == PACKET_OUTGOING) continue;
-    // Another master's may pass here too. Of its own, what comes in has been at the slaves or been
-    // sent back on the way, which the working counter tells; an ESC changes a bit of the source.
+    // Another master's frames may pass here, too. A frame of its own that comes in has been at the
+    // slaves or been sent back on the way, which the working counter tells; an ESC changes a bit of
+    // the source.
     const bool own = ((in_[6] ^ out_[6]) & ~kLocallyAdministered) == 0 &&
                      std::equal(in_.begin() + 7, in_.begin() + 12, out_.begin() + 7);
     if (side_ == Side::kMaster && !own) continue;
