@@ -46,11 +46,11 @@ std::string RefusalReason(int8_t kind, int8_t verdict) {
     case answer_t::VERDICT_NOT_ABLE:
       if (stand) {
         return "this run's step_planner does not step; its scenario needs "
-               "step_planner.walk.enabled=true or step_planner.recovery.enabled=true";
+               "base: \"base/walking\" or step_planner.recovery.enabled=true";
       }
       if (kind == act_t::KIND_WALK || kind == act_t::KIND_STEP) {
         return "this run's step_planner does not walk; its scenario needs "
-               "step_planner.walk.enabled=true";
+               "base: \"base/walking\"";
       }
       return "this run's configuration does not allow it";
     case answer_t::VERDICT_NOT_NOW:

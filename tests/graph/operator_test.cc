@@ -93,7 +93,7 @@ TEST_F(OperatorTest, APushAndASettingAreRepeatedToTheBit) {
   // Refused, with no effect and why.
   for (const auto& [arguments, why] : std::vector<std::pair<std::vector<std::string>, std::string>>{
            {{"step"}, "does not walk"},
-           {{"walk", "--velocity", "0.1,0"}, "does not walk"},
+           {{"walk", "--velocity", "0.1,0"}, "its scenario needs base: \"base/walking\""},
            {{"step", "--together"}, "does not step"},
            {{"step", "--next-phase"}, "nothing follows this phase"}}) {
     const ProgramResult refused = Poise(arguments);

@@ -191,10 +191,10 @@ test('after a fall the page starts the run again, and goes back to its first tic
   // It cannot walk: the buttons are grey, and say why.
   for (const button of ['#walk', '#stop-walking', 'text="step, left"']) {
     assert.equal(await page.locator(button).isDisabled(), true, button);
-    assert.match(await page.locator(button).getAttribute('title'), /needs a run with step_planner\.walk\.enabled=true/);
+    assert.match(await page.locator(button).getAttribute('title'), /needs a scenario with base: "base\/walking"/);
   }
   await page.click('.walking summary');
-  assert.match(await page.locator('.reason').innerText(), /needs a run with/);
+  assert.match(await page.locator('.reason').innerText(), /needs a scenario with/);
   const {settings: [setting]} = await standing(page);
   await page.evaluate(([field, value]) => window.poise.control.act('set', {field, value}), [setting.field, 0.9 * setting.value + 0.1 * setting.high]);
   await until(page, ([field, value]) => window.poise.control.setting(field).value !== value, [setting.field, setting.value]);

@@ -15,9 +15,9 @@ const AXES = [['forward', 'm/s'], ['left', 'm/s'], ['turn', 'rad/s']];
 export function obstacle(what, {standing}, run) {
   const {walk, recovery} = run.scenario.step_planner ?? {};
   if (standing.run?.ended) return 'the run has ended: go back, or start again';
-  if (['walk', 'step'].includes(what) && !walk?.enabled) return 'needs a run with step_planner.walk.enabled=true';
+  if (['walk', 'step'].includes(what) && !walk?.enabled) return 'needs a scenario with base: "base/walking"';
   if (what === 'stop_walking' && !walk?.enabled && !recovery?.enabled) {
-    return 'needs a run with step_planner.walk.enabled=true or step_planner.recovery.enabled=true';
+    return 'needs a scenario with base: "base/walking" or step_planner.recovery.enabled=true';
   }
   return what === 'reset' && !standing.stopped ? 'nothing is stopped' : '';
 }
