@@ -4,13 +4,14 @@ A reader has the page and the beginning of a table's heading. It asks the task f
 tells, with a row's flags and the capitals of the page filled in, and puts figures into cells. No command stands here.
 """
 
+import functools
 import os
 import re
 import statistics
 
 NotMade = RuntimeError  # deploy/results puts its own here
 GIVEN = object()  # in place of a cell's figure that the run does not give, such as how many runs were asked for
-READERS, WITHOUT = {}, {}
+READERS = {}
 WORLDS = ("mujoco", "ode")
 
 
@@ -19,6 +20,30 @@ def reads(page, heading):
         READERS[page, heading] = function
         return function
     return keep
+
+
+def reads_row(page, heading):
+    """As `reads`, for a function that also takes a row's number, its first cell and all its cells: it is called for each row."""
+    def keep(function):
+        READERS[page, heading] = lambda task: task.each(functools.partial(function, task))
+        return function
+    return keep
+
+
+def each_column(task, columns, make):
+    """make(place, what) of the columns after the first, `what` from `columns`; what cannot be made is told of its column."""
+    for place, what in enumerate(columns, 1):
+        try:
+            make(place, what)
+        except NotMade as problem:
+            for i in task.rows():
+                task.lack(i, str(problem), place)
+
+
+def put_each(task, i, first, runs, *metrics):
+    """A metric a column, from `first` on: the figures that the runs have of it."""
+    for place, metric in enumerate(metrics, first):
+        task.put(i, place, *(run[metric] for run in runs))
 
 
 def of(kept, claim):
@@ -109,6 +134,36 @@ def _(task):
     task.each(row)
 
 
+@reads_row("experiments", "Joint friction takes")
+def _(task, i, _, cells):
+    task.put(i, 1, task.command(task.told(), flags(cells)).table("limits.csv")[0]["sim.push[0].peak"])
+
+
+@reads_row("experiments", "In 7.5 M_y")
+def _(task, i, _, cells):
+    figures = task.command(task.told(), f"--inline --no-reference {flags(cells)}").summary()[0]
+    put_each(task, i, 1, [figures], "left_foot_pitch_violation_after_contact", "left_foot_roll_violation_after_contact")
+
+
+@reads_row("experiments", "A block 5 cm")
+def _(task, i, first, _):
+    told = task.told() if "`" in first else task.told().replace(" --variant NAME", "")
+    made = task.command(told, "--inline --no-reference", NAME=re.findall(r"`(\w+)`|$", first)[0])
+    figures, summary = made.summary()
+    task.put(i, "touch-down", figures["touch_down"])
+    height = [re.search(r"([\d.]+) mm above", e["detail"]) for e in summary["events"] if e["name"] == "touch_down"]
+    if height and height[-1]:
+        task.put(i, "left sole", height[-1][1])
+
+
+@reads_row("experiments", "Of 300 blocks")
+def _(task, i, _, cells):
+    rows = task.command(task.told(), f"{flags(cells)} --column violated_ticks --column com_error_end").table()
+    task.put(i, "stand", len(stands(rows)))
+    task.put(i, "with a condition", sum(v > 0 for v in column(rows, "violated_ticks")))
+    task.put(i, "COM behind", sum(v > 20 for v in column(stands(rows), "com_error_end")))
+
+
 @reads("engines", "All 95 checks")
 def _(task):
     rows = task.command(task.told()).table("worlds.csv")
@@ -122,45 +177,6 @@ def _(task):
     task.each(row)
 
 
-@reads("experiments", "Joint friction takes")
-def _(task):
-    def row(i, _, cells):
-        task.put(i, 1, task.command(task.told(), flags(cells)).table("limits.csv")[0]["sim.push[0].peak"])
-    task.each(row)
-
-
-@reads("experiments", "In 7.5 M_y")
-def _(task):
-    def row(i, _, cells):
-        figures = task.command(task.told(), f"--inline --no-reference {flags(cells)}").summary()[0]
-        task.put(i, 1, figures["left_foot_pitch_violation_after_contact"])
-        task.put(i, 2, figures["left_foot_roll_violation_after_contact"])
-    task.each(row)
-
-
-@reads("experiments", "A block 5 cm")
-def _(task):
-    def row(i, first, _):
-        told = task.told() if "`" in first else task.told().replace(" --variant NAME", "")
-        made = task.command(told, "--inline --no-reference", NAME=re.findall(r"`(\w+)`|$", first)[0])
-        figures, summary = made.summary()
-        task.put(i, "touch-down", figures["touch_down"])
-        height = [re.search(r"([\d.]+) mm above", e["detail"]) for e in summary["events"] if e["name"] == "touch_down"]
-        if height and height[-1]:
-            task.put(i, "left sole", height[-1][1])
-    task.each(row)
-
-
-@reads("experiments", "Of 300 blocks")
-def _(task):
-    def row(i, _, cells):
-        rows = task.command(task.told(), f"{flags(cells)} --column violated_ticks --column com_error_end").table()
-        task.put(i, "stand", len(stands(rows)))
-        task.put(i, "with a condition", sum(v > 0 for v in column(rows, "violated_ticks")))
-        task.put(i, "COM behind", sum(v > 20 for v in column(stands(rows), "com_error_end")))
-    task.each(row)
-
-
 @reads("engines", "Of a thousand")
 def _(task):
     ode, mujoco = (task.command(command).table() for command in task.claim.commands())
@@ -169,23 +185,21 @@ def _(task):
     task.put(0, 2, sum(a["outcome"] == b["outcome"] == "stands" for a, b in zip(ode, mujoco)))
 
 
-@reads("engines", "Both step")
-def _(task):
-    def row(i, first, cells):
-        if "world_step" in cells[-1]:
-            text = task.command(task.told("build/")).text
-            for place, world in ((2, "ode"), (3, "mujoco")):  # its last time is the processor's
-                task.put(i, place, re.search(rf"^{world}/\S+\s+[\d.]+ us\s+([\d.]+) us", text, re.M)[1])
-            task.lack(i, "dWorldStep is in no engine of today", 1)
-            return
-        told = re.findall(r"`(poise [^`]*)`", cells[-1])
-        if not told:  # "the same with --robot"
-            told = [task.told("poise run stand").replace("heron/heron", "g1/g1" if "G1" in first else "tocabi/tocabi")]
-        for place, world in ((2, "ode"), (3, "mujoco")):
-            processor = statistics.median(task.command(told[0], f"--world {world} --seed {n}").processor for n in (1, 2, 3))
-            task.put(i, place, processor, 10 / processor)
+@reads_row("engines", "Both step")
+def _(task, i, first, cells):
+    if "world_step" in cells[-1]:
+        text = task.command(task.told("build/")).text
+        for place, world in ((2, "ode"), (3, "mujoco")):  # its last time is the processor's
+            task.put(i, place, re.search(rf"^{world}/\S+\s+[\d.]+ us\s+([\d.]+) us", text, re.M)[1])
         task.lack(i, "dWorldStep is in no engine of today", 1)
-    task.each(row)
+        return
+    told = re.findall(r"`(poise [^`]*)`", cells[-1])
+    if not told:  # "the same with --robot"
+        told = [task.told("poise run stand").replace("heron/heron", "g1/g1" if "G1" in first else "tocabi/tocabi")]
+    for place, world in ((2, "ode"), (3, "mujoco")):
+        processor = statistics.median(task.command(told[0], f"--world {world} --seed {n}").processor for n in (1, 2, 3))
+        task.put(i, place, processor, 10 / processor)
+    task.lack(i, "dWorldStep is in no engine of today", 1)
 
 
 @reads("estimation", "The invariant filter")
@@ -217,52 +231,62 @@ def _(task):
 def _(task):
     metrics = ("invariant_ekf_nees_share", "invariant_ekf_nees_observable_share", "invariant_ekf_position_rms")
     stiffness = "sim.drive_train.gear_stiffness"
-    for place, scenario in enumerate(SECTIONS.values()):
-        try:
-            rows = task.command(task.told(), " ".join(f"--column {m}" for m in metrics), SCENARIO=scenario).table()
-        except NotMade as problem:
-            for i in task.rows():
-                task.lack(i, str(problem), place + 1)
-            continue
+
+    def make(place, scenario):
+        rows = task.command(task.told(), " ".join(f"--column {m}" for m in metrics), SCENARIO=scenario).table()
         for i in task.rows():
             gear = float(re.match(r"\S+", task.claim.rows[i][0])[0])
             mine = [row for row in rows if row[stiffness] == gear]
             nees, observable, position = ([row[m] for row in mine] for m in metrics)
-            task.put(i, place + 1, min(nees), min(observable), max(position))
+            task.put(i, place, min(nees), min(observable), max(position))
+
+    each_column(task, SECTIONS.values(), make)
 
 
-@reads("estimation", "What that gains")
-def _(task):
-    def row(i, first, cells):
-        rows = task.command(task.told(), flags(cells)).table("limits.csv")
-        for place, limit in enumerate(rows):
-            task.put(i, place + 1, limit["sim.push[0].peak"])
-    task.each(row)
+@reads_row("estimation", "What that gains")
+def _(task, i, _, cells):
+    for place, limit in enumerate(task.command(task.told(), flags(cells)).table("limits.csv"), 1):
+        task.put(i, place, limit["sim.push[0].peak"])
 
 
-@reads("foot_wrenches", "A foot sensor that fails")
-def _(task):
-    def row(i, first, _):
-        kind, force = first.split()[0].upper(), re.search(r"[−+]\d+", first)
-        bias = f" --set sim.foot_sensor_fault[0].force_z={force[0].replace('−', '-')}" if force else ""
-        for place, told, start in ((1, task.told(), 0.2), (2, task.told("poise run unknown"), 10)):
-            made = task.command(told, f"--inline --no-reference --set sim.foot_sensor_fault[0].foot=left --set "
-                                      f"sim.foot_sensor_fault[0].kind={kind} --set sim.foot_sensor_fault[0].start={start}{bias}")
-            noticed = [e["time"] for e in made.summary()[1]["events"] if e["name"] == "foot_sensor_fault"]
-            if not noticed:
-                task.lack(i, "the fault was not noticed", place)
-                continue
-            late = noticed[0] - start
-            if " ms" in task.claim.rows[i][place]:
-                late *= 1000
-            task.put(i, place, *[late, GIVEN][:1 + task.claim.rows[i][place].count("20 ms")])
-    task.each(row)
+@reads_row("estimation", "A load is found")
+def _(task, i, first, cells):
+    if first.startswith("Talos"):
+        raise NotMade("its command is not on the page: poise sweep push has no load by itself")
+    when = re.search(r"(\d) s", first)
+    end = "end" if not when or when[1] == "6" else "2s"
+    runs = [task.command(task.told(), f"--inline --no-reference {flags(cells)} --seed {seed}".replace("  ", " ")).summary()[0]
+            for seed in (1, 2, 3)]
+    mass, x, y, z = (max((run[f"{metric}_{end}"] for run in runs), key=abs) for metric in
+                     ("mass_error", "com_estimate_error_x", "com_estimate_error_y", "com_estimate_error_z"))
+    task.put(i, "mass", mass)
+    task.put(i, "COM x, y", x, y)
+    task.put(i, "COM z", z)
+    x, y = ([abs(run[f"imu_tilt_{axis}_{end}"]) for run in runs] for axis in "xy")
+    task.put(i, "IMU", min(x), max(x), -min(y), -max(y))
+
+
+@reads_row("foot_wrenches", "A foot sensor that fails")
+def _(task, i, first, _):
+    kind, force = first.split()[0].upper(), re.search(r"[−+]\d+", first)
+    bias = f" --set sim.foot_sensor_fault[0].force_z={force[0].replace('−', '-')}" if force else ""
+    for place, told, start in ((1, task.told(), 0.2), (2, task.told("poise run unknown"), 10)):
+        made = task.command(told, f"--inline --no-reference --set sim.foot_sensor_fault[0].foot=left --set "
+                                  f"sim.foot_sensor_fault[0].kind={kind} --set sim.foot_sensor_fault[0].start={start}{bias}")
+        noticed = [e["time"] for e in made.summary()[1]["events"] if e["name"] == "foot_sensor_fault"]
+        if not noticed:
+            task.lack(i, "the fault was not noticed", place)
+            continue
+        late = noticed[0] - start
+        if " ms" in task.claim.rows[i][place]:
+            late *= 1000
+        task.put(i, place, *[late, GIVEN][:1 + task.claim.rows[i][place].count("20 ms")])
 
 
 @reads("foot_wrenches", "Of 300 touch-downs")
 def _(task):
     rows = task.command(task.told()).table()
-    delays = [v for v in column(rows, "touch_down_delay_max")]
+    delays = column(rows, "touch_down_delay_max")
     task.put(0, "stood", len(stands(rows)))
     task.put(0, "late", sum(v <= 10 for v in delays))
     for place, share in ((3, 0.5), (4, 0.9), (5, 1)):
@@ -271,24 +295,42 @@ def _(task):
         task.lack(i, "which of the runs are meant is not in the table")
 
 
-@reads("pushes", "`best_strategy` stands 0.9")
-def _(task):
-    def row(i, first, cells):
-        rows = pushes(task, first, cells[1])
-        peak, impulse, share = (column(rows, name) for name in ("sim.push[0].peak", "impulse", "share_of_lip"))
-        task.put(i, "N", min(peak), max(peak))
-        task.put(i, "N·s", min(impulse), max(impulse))
-        task.put(i, "share", statistics.mean(share), min(share))
-    task.each(row)
+@reads_row("foot_wrenches", "Without sensors")
+def _(task, i, first, _):
+    if "the three" in first:
+        raise NotMade("its row is of three commands")
+    scenario, seeds = re.findall(r"`(\w+)", first)[0], re.search(r"(\d) seeds", first)
+    told = task.told().replace("seed=1:6:6", f"seed=1:{seeds[1]}:{seeds[1]}" if seeds else "seed=1")
+    more = ""
+    if scenario == "push":
+        told = told.replace(" --variant no_foot_sensors", "")
+        more = f"--set robot={robot(first.partition(', ')[2])} --set sim.foot_sensors=false"
+    elif "sim.foot_sensors" in first:
+        told, more = told.replace(" --variant no_foot_sensors", ""), "--set sim.foot_sensors=false"
+    rows = task.command(told, more, SCENARIO=scenario).table()
+    most = [max(column(rows, f"observer_{name}")) for name in ("force_rms", "force_max", "cop_rms", "cop_max")]
+    task.put(i, "force", *most[:2])
+    task.put(i, "centre", *most[2:])
+    task.put(i, "NEES", min(column(rows, "observer_nees_share")))
+    delays = column(rows, "touch_down_delay_max")
+    if delays:
+        task.put(i, "touch-down", min(delays), max(delays))
 
 
-@reads("pushes", "Ahead (0°)")
-def _(task):
-    def row(i, first, _):
-        limits = pushes(task, "`best_strategy`" if first.startswith("best") else "the paper's", first.split(", ")[1])
-        for place, limit in enumerate(limits):
-            task.put(i, place + 1, limit["share_of_lip"])
-    task.each(row)
+@reads_row("pushes", "`best_strategy` stands 0.9")
+def _(task, i, first, cells):
+    rows = pushes(task, first, cells[1])
+    peak, impulse, share = (column(rows, name) for name in ("sim.push[0].peak", "impulse", "share_of_lip"))
+    task.put(i, "N", min(peak), max(peak))
+    task.put(i, "N·s", min(impulse), max(impulse))
+    task.put(i, "share", statistics.mean(share), min(share))
+
+
+@reads_row("pushes", "Ahead (0°)")
+def _(task, i, first, _):
+    limits = pushes(task, "`best_strategy`" if first.startswith("best") else "the paper's", first.split(", ")[1])
+    for place, limit in enumerate(limits, 1):
+        task.put(i, place, limit["share_of_lip"])
 
 
 def pushes(task, who, support):
@@ -301,23 +343,23 @@ def pushes(task, who, support):
     return task.command(told, more).table("limits.csv")
 
 
-@reads("pushes", "No push that stood")
-def _(task):
-    def row(i, first, _):
-        told = task.told(f"poise sweep capture_point_{'double' if 'double' in first else 'single'}")
-        rows = task.command(told, "--variant best_strategy" if "best" in first else "").table()
-        stood, fell = stands(rows), [row for row in rows if row["outcome"] != "stands"]
-        warnings = [w for w in column(fell, "step_warning_time") if w > 0]
-        task.put(i, "stand", len(stood))
-        task.put(i, "falls", len(warnings), len(fell))
-        task.put(i, "false", sum(v > 0 for v in column(stood, "step_needed_time")), len(stood))
-        task.put(i, "median", statistics.median(warnings))
-    task.each(row)
+@reads_row("pushes", "No push that stood")
+def _(task, i, first, _):
+    told = task.told(f"poise sweep capture_point_{'double' if 'double' in first else 'single'}")
+    rows = task.command(told, "--variant best_strategy" if "best" in first else "").table()
+    stood, fell = stands(rows), [row for row in rows if row["outcome"] != "stands"]
+    warnings = [w for w in column(fell, "step_warning_time") if w > 0]
+    task.put(i, "stand", len(stood))
+    task.put(i, "falls", len(warnings), len(fell))
+    task.put(i, "false", sum(v > 0 for v in column(stood, "step_needed_time")), len(stood))
+    task.put(i, "median", statistics.median(warnings))
 
 
-def benchmark(task, told, i, first):
-    """A benchmark's figures into the columns of its tables."""
-    made = task.command(told, NAME=robot(first))
+@reads_row("pushes", "The whole benchmark")
+@reads_row("pushes", "The quick benchmark")
+@reads_row("pushes", "In ODE both robots")
+def _(task, i, first, _):
+    made = task.command(task.told("poise benchmark"), NAME=robot(first))
     rows = made.table("benchmark.csv")
     part = {name: [r for r in rows if r["part"] == name] for name in ("push_double", "push_single", "blocks", "lost", "late")}
     place = 1
@@ -334,44 +376,35 @@ def benchmark(task, told, i, first):
         task.put(i, place, min(r["value"] for r in part[name] if r["point"] not in ("mean", "least")))
 
 
-for heading in ("The whole benchmark", "The quick benchmark", "In ODE both robots"):
-    reads("pushes", heading)(
-        lambda task: task.each(lambda i, first, _: benchmark(task, task.told("poise benchmark"), i, first)))
-
-
 @reads("gains", "On soft blocks")
 def _(task):
     task.lack(0, "the gains of hard ground are not on the page")
     points = [*range(1, 9), *range(31, 39), *range(81, 89)]
-    for place, name in ((1, "heron"), (2, "G1")):
-        try:
-            rows = task.command(task.told(), NAME=robot(name)).table("parts/blocks/table.csv")
-            task.put(1, place, sum(rows[point - 1]["outcome"] == "stands" for point in points))
-        except NotMade as problem:
-            task.lack(1, str(problem), place)
+
+    def make(place, name):
+        rows = task.command(task.told(), NAME=name).table("parts/blocks/table.csv")
+        task.put(1, place, sum(rows[point - 1]["outcome"] == "stands" for point in points))
+
+    each_column(task, ("heron/heron", "g1/g1"), make)
 
 
-@reads("redistribution", "Feedback takes")
-def _(task):
-    on = "--set redistributor.feedback.enabled=true"
-
-    def row(i, first, _):
-        scenario = re.findall(r"`(\w+)`", first)[0]
-        for place, more in ((1, ""), (2, on), (3, f"{on} --set redistributor.feedback.integral=25")):
-            figures = task.command(task.told(), more, SCENARIO=scenario).table()[0]
-            task.put(i, place, *(figures[f"foot_force_error_{part}rms"] for part in ("", "internal_", "resultant_")))
-    task.each(row)
+FEEDBACK = "--set redistributor.feedback.enabled=true"
 
 
-@reads("redistribution", "The survivable push")
-def _(task):
-    def row(i, first, cells):
-        more = "--variant best_strategy" if "best" in first else ""
-        feedback = "--set redistributor.feedback.enabled=true"
-        limits = task.command(task.told(), f"{more} {feedback}".strip()).table("limits.csv")
-        for place, direction in ((1, 0), (2, 4), (3, 8)):  # of 16
-            task.put(i, place, limits[direction]["sim.push[0].peak"])
-    task.each(row)
+@reads_row("redistribution", "Feedback takes")
+def _(task, i, first, _):
+    scenario = re.findall(r"`(\w+)`", first)[0]
+    for place, more in ((1, ""), (2, FEEDBACK), (3, f"{FEEDBACK} --set redistributor.feedback.integral=25")):
+        figures = task.command(task.told(), more, SCENARIO=scenario).table()[0]
+        task.put(i, place, *(figures[f"foot_force_error_{part}rms"] for part in ("", "internal_", "resultant_")))
+
+
+@reads_row("redistribution", "The survivable push")
+def _(task, i, first, _):
+    more = f"--variant best_strategy {FEEDBACK}" if "best" in first else FEEDBACK
+    limits = task.command(task.told(), more).table("limits.csv")
+    for place, direction in ((1, 0), (2, 4), (3, 8)):  # of 16
+        task.put(i, place, limits[direction]["sim.push[0].peak"])
 
 
 @reads("soft_ground", "Of 1,000 courses")
@@ -422,39 +455,46 @@ def _(task):
 
 @reads("soft_ground", "Stairs of 10 cm")
 def _(task):
-    for i, told, more in ((0, task.told("poise run walk_stairs"), ""), (1, task.told("poise run walk_stairs"), "--variant down")):
+    for i, more in enumerate(("", "--variant down ")):
         for world in WORLDS:
-            figures, _ = task.command(told, f"{more} --world {world}".strip()).summary()
+            figures, _ = task.command(task.told("poise run walk_stairs"), f"{more}--world {world}").summary()
             task.put(i, 1, figures["steps"], figures["violated_ticks"], GIVEN)
     for i in task.rows():
         task.lack(i, "only the courses that are told are read")
 
 
-@reads("speed", "The planner takes")
+@reads("soft_ground", "Below 5 kN/m")
 def _(task):
-    def row(i, _, cells):
-        told = re.findall(r"`(poise [^`]*)`", cells[0])[0]
-        times = [c["latency_us"] for world in WORLDS for c in task.command(told, f"--world {world}").summary()[1]["components"]
-                 if c["name"] == "step_planner"]
-        task.put(i, "median", *sorted(t["median"] for t in times)[:1 + cells[1].count(" to ")])
-        task.put(i, "99 %", *sorted(t["p99"] for t in times))
-        task.lack(i, "how busy the machine is, is not a flag", 3)
-    task.each(row)
+    text = task.command(task.told()).text
+    for place, stiffness in enumerate((2000, 3000, 5000, 7000), 1):
+        shares = re.search(rf"^ *{stiffness} N/m and more: ([\d.]+) of the courses, ([\d.]+) if", text, re.M)
+        for i in task.rows():
+            task.put(i, place, shares[1 + i])
+
+
+@reads_row("speed", "The planner takes")
+def _(task, i, _, cells):
+    told = re.findall(r"`(poise [^`]*)`", cells[0])[0]
+    times = [c["latency_us"] for world in WORLDS for c in task.command(told, f"--world {world}").summary()[1]["components"]
+             if c["name"] == "step_planner"]
+    task.put(i, "median", *sorted(t["median"] for t in times)[:1 + cells[1].count(" to ")])
+    task.put(i, "99 %", *sorted(t["p99"] for t in times))
+    task.lack(i, "how busy the machine is, is not a flag", 3)
+
+
+@reads_row("speed", "A thousand runs")
+def _(task, i, _, cells):
+    told = re.findall(r"`([^`]+)`", cells[2])
+    if i > 2:
+        raise NotMade("installations and a cluster: run its row by hand")
+    made = task.command(re.sub(" --out FOLDER", "", told[0]))
+    task.put(i, "figure", *((made.seconds,), (GIVEN, made.seconds), (made.seconds, made.processor))[i])
 
 
 @reads("steps", "From both feet")
-def _(task):
-    step_limits(task, "--set step_planner.recovery.enabled=false --set step_planner.hip_strategy.enabled=true")
-
-
 @reads("steps", "On the right foot")
 def _(task):
     step_limits(task, "--set step_planner.recovery.enabled=false --set step_planner.hip_strategy.enabled=true")
-
-
-@reads("steps_by_robot", "heron gains")
-def _(task):
-    step_limits(task, "--set step_planner.recovery.enabled=false")
 
 
 STEP_ROWS = {"steps, N·s": "impulse", "steps: N·s": "impulse", "no step, N·s": "impulse", "no step: of m ω r": "share_of_lip",
@@ -477,32 +517,30 @@ def step_limits(task, no_step):
         if group.startswith("G1"):
             told = told.replace("heron/heron", "g1/g1")
         limits = task.command(told, no_step if without_step else "", W="ode" if "ODE" in group else "mujoco").table("limits.csv")
-        for place, limit in enumerate(limits):
+        for place, limit in enumerate(limits, 1):
             if limit[label] != "":
-                task.put(i, place + 1, limit[label])
+                task.put(i, place, limit[label])
     task.each(row)
 
 
 @reads("steps", "Of 500 random")
 def _(task):
     names = {}
-    for place, (feet, world) in enumerate((f, w) for f in ("double", "single") for w in WORLDS):
-        told = task.told().replace("_double", f"_{feet}")
-        try:
-            rows = task.command(told, W=world).table()
-        except NotMade as problem:
-            for i in task.rows():
-                task.lack(i, str(problem), place + 1)
-            continue
+
+    def make(place, started):
+        feet, world = started
+        rows = task.command(task.told().replace("_double", f"_{feet}"), W=world).table()
         stood, fell = stands(rows), [row for row in rows if row["outcome"] != "stands"]
         stepped = [row for row in stood if row["steps"] > 0]
         pair = lambda name: (quantile(column(stepped, name), 0.5), quantile(column(stepped, name), 0.9))  # noqa: E731
-        names[place + 1] = {
+        names[place] = {
             "stand with": [len(stood)], "of these by": [len(stepped)],
             "fall, no step": [sum(row["steps"] == 0 for row in fell)], "fall after": [sum(row["steps"] > 0 for row in fell)],
             "of those that stand": pair("step_decision"), "to touch-down": pair("step_touch_down"),
             "largest torque": pair("torque_step_max"), "violated": pair("violated_ticks"),
             "time in which": pair("estimator_left_foot_slip_time") + pair("estimator_right_foot_slip_time")}
+
+    each_column(task, [(feet, world) for feet in ("double", "single") for world in WORLDS], make)
     if 1 in names:  # without a step: MuJoCo alone
         for place, feet in ((1, "double"), (3, "single")):
             told = task.told().replace("_double", f"_{feet}").replace("--variant step", "--variant best_strategy")
@@ -517,41 +555,34 @@ def _(task):
     task.each(row)
 
 
+@reads("steps_by_robot", "heron gains")
+def _(task):
+    step_limits(task, "--set step_planner.recovery.enabled=false")
+
+
 @reads("steps_by_robot", "A foot is down")
 def _(task):
-    for place, (told, world) in enumerate((t, w) for t in task.claim.commands() for w in ("ode", "mujoco")):
+    for place, (told, world) in enumerate(((t, w) for t in task.claim.commands() for w in ("ode", "mujoco")), 1):
         figures, _ = task.command(told, f"--no-reference --inline --world {world}").summary()
         for i, metric in enumerate(("step_decision", "step_touch_down", "foothold_margin_min", "violated_ticks")):
-            task.put(i, place + 1, figures[metric])
+            task.put(i, place, figures[metric])
 
 
-@reads("steps_by_robot", "The variant of `push`")
-def _(task):
-    for i in task.rows():
-        task.lack(i, "the command tries 5 of the values that the rows have")
+@reads_row("walking", "Six robots")
+def _(task, i, first, _):
+    figures = [task.command(task.told(), NAME=robot(first), W=world).summary()[0] for world in WORLDS]
+    for place, f in enumerate(figures, 1):
+        task.put(i, place, f["steps"], f["walk_way"])
+    put_each(task, i, 3, figures, "torque_step_max", "joint_torque_share")
 
 
-@reads("walking", "Six robots")
-def _(task):
-    def row(i, first, _):
-        figures = [task.command(task.told(), NAME=robot(first), W=world).summary()[0] for world in WORLDS]
-        for place, f in enumerate(figures):
-            task.put(i, place + 1, f["steps"], f["walk_way"])
-        task.put(i, 3, *(f["torque_step_max"] for f in figures))
-        task.put(i, 4, *(f["joint_torque_share"] for f in figures))
-    task.each(row)
-
-
-@reads("walking", "The paper's robot walks")
-def _(task):
-    def row(i, first, cells):
-        speed, longest = re.match(r"[\d.]+", first)[0], re.search(r"`(longest=[\d.]+)`", first)
-        more = f"--set step_planner.walk.{longest[1]} " if longest else ""
-        figures = [task.command(task.told(), f"{more}--world {world}", V=speed).summary()[0] for world in WORLDS]
-        for place, metric in enumerate(("walk_speed_max", "walk_velocity_error_rms", "walk_cost_of_transport", "violated_ticks",
-                                        "torque_step_max", "joint_torque_share")):
-            task.put(i, place + 1, *(f[metric] for f in figures))
-    task.each(row)
+@reads_row("walking", "The paper's robot walks")
+def _(task, i, first, cells):
+    speed, longest = re.match(r"[\d.]+", first)[0], re.search(r"`(longest=[\d.]+)`", first)
+    more = f"--set step_planner.walk.{longest[1]} " if longest else ""
+    figures = [task.command(task.told(), f"{more}--world {world}", V=speed).summary()[0] for world in WORLDS]
+    put_each(task, i, 1, figures, "walk_speed_max", "walk_velocity_error_rms", "walk_cost_of_transport", "violated_ticks",
+             "torque_step_max", "joint_torque_share")
 
 
 @reads("walking", "It walked an hour")
@@ -559,99 +590,26 @@ def _(task):
     made = task.command(task.told())
     figures, _ = made.summary()
     task.put(0, 0, figures["steps"], figures["walk_way"])
-    task.put(0, 2, figures["walk_velocity_error_rms"])
-    task.put(0, 3, figures["torque_step_max"])
-    task.put(0, 4, figures["joint_torque_share"])
-    task.put(0, 5, figures["walk_cost_of_transport"])
+    put_each(task, 0, 2, [figures], "walk_velocity_error_rms", "torque_step_max", "joint_torque_share", "walk_cost_of_transport")
     task.put(0, 6, made.processor, GIVEN)
 
 
-@reads("walking", "With it iCub")
-def _(task):
-    def row(i, first, cells):
-        off = "--set redistributor.friction_compensation.share=0"
-        figures = [task.command(task.told(), more, NAME=robot(first), V=cells[1]).summary()[0] for more in (off, "")]
-        task.put(i, 2, *(f["violated_ticks"] for f in figures))
-        task.put(i, 3, *(f["joint_torque_share"] for f in figures))
-    task.each(row)
+@reads_row("walking", "With it iCub")
+def _(task, i, first, cells):
+    off = "--set redistributor.friction_compensation.share=0"
+    figures = [task.command(task.told(), more, NAME=robot(first), V=cells[1]).summary()[0] for more in (off, "")]
+    put_each(task, i, 2, figures, "violated_ticks", "joint_torque_share")
 
 
-@reads("drives", "7.5 stands")
-def _(task):
-    def row(i, _, cells):
-        if i == 1:
-            raise NotMade("needs root and two network interfaces: run its row by hand")
-        figures, _ = task.command(task.told("deploy/run"), "--no-reference").summary()
-        task.put(i, 1, figures["drive_torque_step"], GIVEN, GIVEN, figures["bus_frames_sent"], GIVEN)
-    task.each(row)
+@reads_row("drives", "7.5 stands")
+def _(task, i, _, cells):
+    if i == 1:
+        raise NotMade("needs root and two network interfaces: run its row by hand")
+    figures, _ = task.command(task.told("deploy/run"), "--no-reference").summary()
+    task.put(i, 1, figures["drive_torque_step"], GIVEN, GIVEN, figures["bus_frames_sent"], GIVEN)
 
 
-@reads("soft_ground", "Below 5 kN/m")
-def _(task):
-    text = task.command(task.told()).text
-    for place, stiffness in enumerate((2000, 3000, 5000, 7000)):
-        shares = re.search(rf"^ *{stiffness} N/m and more: ([\d.]+) of the courses, ([\d.]+) if", text, re.M)
-        for i in task.rows():
-            task.put(i, place + 1, shares[1 + i])
-
-
-@reads("estimation", "A load is found")
-def _(task):
-    def worst(rows, *metrics):
-        return [max((row[metric] for row in rows), key=abs) for metric in metrics]
-
-    def row(i, first, cells):
-        if first.startswith("Talos"):
-            raise NotMade("its command is not on the page: poise sweep push has no load by itself")
-        when = re.search(r"(\d) s", first)
-        end = "end" if not when or when[1] == "6" else "2s"
-        runs = [task.command(task.told(), f"--inline --no-reference {flags(cells)} --seed {seed}".replace("  ", " ")).summary()[0]
-                for seed in (1, 2, 3)]
-        task.put(i, "mass", *worst(runs, f"mass_error_{end}"))
-        task.put(i, "COM x, y", *worst(runs, f"com_estimate_error_x_{end}", f"com_estimate_error_y_{end}"))
-        task.put(i, "COM z", *worst(runs, f"com_estimate_error_z_{end}"))
-        x, y = ([abs(run[f"imu_tilt_{axis}_{end}"]) for run in runs] for axis in "xy")
-        task.put(i, "IMU", min(x), max(x), -min(y), -max(y))
-
-    task.each(row)
-
-
-@reads("foot_wrenches", "Without sensors")
-def _(task):
-    def row(i, first, _):
-        if "the three" in first:
-            raise NotMade("its row is of three commands")
-        scenario, seeds = re.findall(r"`(\w+)", first)[0], re.search(r"(\d) seeds", first)
-        told = task.told().replace("seed=1:6:6", f"seed=1:{seeds[1]}:{seeds[1]}" if seeds else "seed=1")
-        more = ""
-        if scenario == "push":
-            told = told.replace(" --variant no_foot_sensors", "")
-            more = f"--set robot={robot(first.partition(', ')[2])} --set sim.foot_sensors=false"
-        elif "sim.foot_sensors" in first:
-            told, more = told.replace(" --variant no_foot_sensors", ""), "--set sim.foot_sensors=false"
-        rows = task.command(told, more, SCENARIO=scenario).table()
-        most = [max(column(rows, f"observer_{name}")) for name in ("force_rms", "force_max", "cop_rms", "cop_max")]
-        task.put(i, "force", *most[:2])
-        task.put(i, "centre", *most[2:])
-        task.put(i, "NEES", min(column(rows, "observer_nees_share")))
-        delays = column(rows, "touch_down_delay_max")
-        if delays:
-            task.put(i, "touch-down", min(delays), max(delays))
-    task.each(row)
-
-
-@reads("speed", "A thousand runs")
-def _(task):
-    def row(i, _, cells):
-        told = re.findall(r"`([^`]+)`", cells[2])
-        if i > 2:
-            raise NotMade("installations and a cluster: run its row by hand")
-        made = task.command(re.sub(" --out FOLDER", "", told[0]))
-        task.put(i, "figure", *((made.seconds,), (GIVEN, made.seconds), (made.seconds, made.processor))[i])
-    task.each(row)
-
-
-WITHOUT.update({
+WITHOUT = {  # tables of no reader, and why
     ("drives", "Of 100 faults"): "the test prints no counts of what ended how, and faults come at random moments",
     ("drives", "A million broken"): "passing is the figure; two of the three need build/sanitize: run the rows by hand",
     ("engines", "The engine takes"): "perf record names no run, and symbols are sorted by hand",
@@ -662,6 +620,7 @@ WITHOUT.update({
     ("speed", "A hundred faults"): "real time on a machine that is kept busy on purpose: run the rows by hand",
     ("speed", "From sensors"): "real time of an idle and a busy machine: run the rows by hand",
     ("speed", "An hour in one process"): "times of a machine, with logs of 13 GB: run the rows by hand",
+    ("steps_by_robot", "The variant of `push`"): "the command tries 5 of the values that the rows have",
     ("walking", "Compensated friction"): "the soles' tilt at touch-down is no metric and no figure of an event",
     ("walking", "Half of the friction"): "the soles' tilt is no metric, and rows differ in what they tell",
-})
+}

@@ -46,7 +46,7 @@ test('every table has a command or a reason, and a reader or a reason', () => {
 });
 
 test('every reader and every reason belongs to one table', () => {
-  const names = [...read('docs/site/figures.py').matchAll(/^(?:@reads| {4})\("(\w+)", "([^"]+)"\)/gm)];
+  const names = [...read('docs/site/figures.py').matchAll(/^(?:@reads(?:_row)?| {4})\("(\w+)", "([^"]+)"\)/gm)];
   assert.ok(names.length > 40, `${names.length} found`);
   for (const [, page, heading] of names) {
     const found = read(`docs/results/${page}.md`).split('\n').filter((line) => line.startsWith(`## ${heading}`));
