@@ -249,28 +249,44 @@ int64_t Session::Step(int64_t ticks) {
   for (ForeignComponent* const foreign : foreign_) {
     if (foreign->error()) std::rethrow_exception(foreign->error());
   }
+  ThrowRefusals();
   return done;
 }
 
 void Session::Push(const std::string& body, const Eigen::Vector3d& force,
                    const Eigen::Vector3d& point, int64_t ticks) {
+  OperatorAct act;
+  act.kind = OperatorAct::Kind::kPush;
+  act.name = body;
+  act.force = force;
+  act.point = point;
+  act.duration = static_cast<double>(ticks) * spec_.tick_period();
+  Do(std::move(act));
+}
+
+void Session::Walk(std::optional<Eigen::Vector3d> velocity) {
+  OperatorAct act;
+  act.kind = velocity ? OperatorAct::Kind::kWalk : OperatorAct::Kind::kStopWalking;
+  act.velocity = velocity.value_or(Eigen::Vector3d::Zero());
+  Do(std::move(act));
+}
+
+void Session::Do(OperatorAct act) {
   const Lock lock(this);
   if (!port_) {
     port_ = std::make_unique<InlinePort>(spec_);
     port_->SetRunner(runner_.get());
   }
-  OperatorAct act;
-  act.kind = OperatorAct::Kind::kPush;
   act.id = next_act_++;
-  act.name = body;
-  act.force = force;
-  act.point = point;
-  act.duration = static_cast<double>(ticks) * spec_.tick_period();
-  port_->Do(act);
+  port_->Do(std::move(act));
+  ThrowRefusals();
+}
+
+void Session::ThrowRefusals() {
+  if (!port_) return;
   for (const OperatorAct& answer : port_->TakeAnswers()) {
-    if (answer.id == act.id && answer.state == OperatorAct::State::kRefused) {
-      throw ConfigError("push: " + answer.reason);
-    }
+    if (answer.state != OperatorAct::State::kRefused) continue;
+    throw ConfigError(fmt::format("{}: {}", ActName(answer.kind), answer.reason));
   }
 }
 

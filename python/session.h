@@ -49,7 +49,7 @@ class Session {
   ~Session();
 
   /// Runs up to `ticks` ticks; returns those run, fewer when the run ends. Throws what a replaced
-  /// component threw, and LogError.
+  /// component threw, LogError, and ConfigError for an act that was refused meanwhile.
   int64_t Step(int64_t ticks);
 
   /// N, world axes, at `point` (m, body frame) of a body from the next tick on, for `ticks` ticks,
@@ -57,6 +57,9 @@ class Session {
   /// simulated robot, the run has ended.
   void Push(const std::string& body, const Eigen::Vector3d& force, const Eigen::Vector3d& point,
             int64_t ticks);
+  /// m/s ahead, m/s to the left, rad/s to the left, from the next tick on; empty: it stops. Throws
+  /// ConfigError, or the Step after it does: a planner that does not walk, numbers out of range.
+  void Walk(std::optional<Eigen::Vector3d> velocity);
   /// The joint's commanded torque (N·m) in place of the redistributor's; empty: no longer. Throws
   /// ConfigError: no such joint, not finite.
   void OverrideTorque(int joint, std::optional<double> torque);
@@ -94,6 +97,10 @@ class Session {
 
  private:
   class Lock;
+  /// Throws ConfigError where it is refused at once.
+  void Do(OperatorAct act);
+  /// Throws ConfigError on the first act that was refused since the last call.
+  void ThrowRefusals();
   void Replace(const SessionOptions& options, ComponentRegistry* registry);
   int FindChannel(const std::string& name) const;
   const OutputPort* Writer(int channel);
@@ -111,7 +118,7 @@ class Session {
   std::vector<ForeignComponent*> foreign_;
   std::shared_ptr<const robot::RobotModel> model_;
   std::vector<std::unique_ptr<MessageLayout>> layouts_;  // by channel; nullptr: none
-  std::unique_ptr<InlinePort> port_;                     // made with the first push
+  std::unique_ptr<InlinePort> port_;                     // made with the first act
   int64_t next_act_ = 1;
   std::vector<double> override_;  // by joint; NaN: none
   bool overrides_ = false;

@@ -109,6 +109,15 @@ void BindSession(py::module_* module) {
                return 0;
              });
            })
+      .def("walk",
+           [](Session& session, const std::optional<std::array<double, 3>>& velocity) {
+             std::optional<Eigen::Vector3d> given;
+             if (velocity) given.emplace((*velocity)[0], (*velocity)[1], (*velocity)[2]);
+             Unlocked([&] {
+               session.Walk(given);
+               return 0;
+             });
+           })
       .def("override_torque",
            [](Session& session, int joint, std::optional<double> torque) {
              Unlocked([&] {

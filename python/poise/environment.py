@@ -121,6 +121,14 @@ class Environment:
         ticks = -1 if duration is None else max(1, round(float(duration) / self.tick_period))
         self._session.push(body, force, point, ticks)
 
+    def walk(self, vx, vy=0.0, wz=0.0):
+        """m/s ahead, m/s and rad/s to the left, from the next tick on, in a scenario that walks, as `walk_dynamic`."""
+        self._session.walk([float(vx), float(vy), float(wz)])
+
+    def stand(self):
+        """Stops walking, the feet side by side."""
+        self._session.walk(None)
+
     def override_torque(self, joint, torque):
         """N·m that the bridge is commanded for a joint (name or index) in the controller's place; None: no longer."""
         if isinstance(joint, str):

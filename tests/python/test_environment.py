@@ -37,6 +37,29 @@ class Steps(unittest.TestCase):
         env.step(60)
         self.assertFalse(np.array_equal(env["ROBOT_STATE"].q, first))
 
+    def test_it_walks_where_it_is_told(self):
+        env = poise.Environment("walk_dynamic", {"step_planner.walk.command": "", "duration": 60})
+        env.step(500)
+        env.walk(0.3)
+        env.step(2000)
+        before = env["GROUND_TRUTH"].com_position[0]
+        env.step(1000)
+        self.assertAlmostEqual((env["GROUND_TRUTH"].com_position[0] - before) / 2, 0.3, delta=0.08)
+        env.stand()
+        env.step(3000)
+        before = np.array(env["GROUND_TRUTH"].com_position)
+        env.step(500)
+        np.testing.assert_allclose(env["GROUND_TRUTH"].com_position, before, atol=0.01)
+        self.assertFalse(env.failed, env.detail)
+        with self.assertRaisesRegex(poise.ConfigError, "walk"):
+            env.walk(9)
+            env.step(2)
+        stands = poise.Environment("stand")
+        stands.step(10)
+        with self.assertRaisesRegex(poise.ConfigError, "walk: this run's step_planner does not walk"):
+            stands.walk(0.1)
+            stands.step(2)
+
     def test_a_push_is_that_of_a_scenario(self):
         ticks, length, force = 100, 50, 70.0
         start = (ticks - 1) * 0.002  # tick i begins where tick i - 1 ended
