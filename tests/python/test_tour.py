@@ -1,0 +1,57 @@
+"""The tour of examples/tour: its geometry, and two of its way-points on the maker's robot."""
+import argparse
+import importlib.util
+import math
+import os
+import pathlib
+import subprocess
+import tempfile
+import types
+import unittest
+
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+MAKER = ROOT.parent / "shared/robots/g1_29dof_tour.xml"
+
+
+def load():
+    spec = importlib.util.spec_from_file_location("tour", ROOT / "examples/tour/tour.py")
+    tour = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tour)
+    return tour
+
+
+class TourTest(unittest.TestCase):
+    def test_the_way_to_a_goal_is_in_axes_of_the_body(self):
+        tour = load()
+        yaw = 2.5
+        truth = types.SimpleNamespace(base_position=[1, 2, 0.7],
+                                      base_orientation=[math.cos(yaw / 2), 0, 0, math.sin(yaw / 2)])
+        ahead = (np.array([1 + 0.3 * math.cos(yaw), 2 + 0.3 * math.sin(yaw)]), yaw - 2 * math.pi)
+        far, off, way = tour.error(truth, ahead)
+        self.assertAlmostEqual(far, 0.3)
+        self.assertAlmostEqual(off, 0)
+        np.testing.assert_allclose(way, [0.3, 0, 0], atol=1e-12)
+        left = (np.array([1 - 0.2 * math.sin(yaw), 2 + 0.2 * math.cos(yaw)]), yaw + 0.4)
+        np.testing.assert_allclose(tour.error(truth, left)[2], [0, 0.2, 0.4], atol=1e-12)
+
+    @unittest.skipUnless(MAKER.exists(), f"the maker's file {MAKER.name} is not beside the repository")
+    def test_it_comes_to_the_first_way_points_with_moving_arms(self):
+        tour = load()
+        tour.WAYPOINTS = 2
+        with tempfile.TemporaryDirectory() as folder:
+            subprocess.run([os.environ["POISE_BIN"] + "/poise", "robot", "import", MAKER, "--to", folder + "/g1"],
+                           check=True, capture_output=True)
+            robot = next(pathlib.Path(folder, "g1").glob("*.pbtxt"))
+            options = argparse.Namespace(robot=str(robot), world="mujoco", fastest=(0.4, 0.15, 0.6), no_punches=True,
+                                         arms_held=False)
+            number, lived, whole, errors, work, why = tour.run((5, options))
+        self.assertEqual((number, whole), (5, True), why)
+        self.assertAlmostEqual(lived, 10, places=6)
+        self.assertLess(errors[0][0], 0.3)
+        self.assertGreater(work, 0)
+
+
+if __name__ == "__main__":
+    unittest.main()
