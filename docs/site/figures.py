@@ -585,6 +585,13 @@ def _(task, i, first, cells):
              "torque_step_max", "joint_torque_share")
 
 
+@reads_row("dynamic_walking", "Six robots")
+def _(task, i, first, cells):
+    figures = [task.command(task.told(), NAME=robot(first), W=world, V=cells[1]).summary()[0] for world in WORLDS]
+    put_each(task, i, 2, figures, "walk_speed_max", "walk_course_share", "walk_cost_of_transport", "joint_torque_share",
+             "violated_ticks")
+
+
 @reads("walking", "It walked an hour")
 def _(task):
     made = task.command(task.told())
@@ -612,6 +619,7 @@ def _(task, i, _, cells):
 WITHOUT = {  # tables of no reader, and why
     ("drives", "Of 100 faults"): "the test prints no counts of what ended how, and faults come at random moments",
     ("drives", "A million broken"): "passing is the figure; two of the three need build/sanitize: run the rows by hand",
+    ("dynamic_walking", "A push in a walk"): "FILE is an import of a maker's file that is no robot of deploy/robots",
     ("engines", "The engine takes"): "perf record names no run, and symbols are sorted by hand",
     ("gains", "The rule gives"): "no run: the linear model of tests/balance/gains_test.cc with that day's robots' files",
     ("gains", "Stiffness and damping"): "its fields stand in the lab, and energy above 30 Hz is no metric",
