@@ -620,6 +620,7 @@ WITHOUT = {  # tables of no reader, and why
     ("drives", "Of 100 faults"): "the test prints no counts of what ended how, and faults come at random moments",
     ("drives", "A million broken"): "passing is the figure; two of the three need build/sanitize: run the rows by hand",
     ("dynamic_walking", "A push in a walk"): "FILE is an import of a maker's file that is no robot of deploy/robots",
+    ("dynamic_walking", "The tour"): "FILE is an import of a maker's file that is no robot of deploy/robots",
     ("engines", "The engine takes"): "perf record names no run, and symbols are sorted by hand",
     ("gains", "The rule gives"): "no run: the linear model of tests/balance/gains_test.cc with that day's robots' files",
     ("gains", "Stiffness and damping"): "its fields stand in the lab, and energy above 30 Hz is no metric",
