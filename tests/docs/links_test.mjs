@@ -22,7 +22,7 @@ const buildFiles = files.filter((f) => /CMakeLists\.txt$/.test(f)).map(text).joi
 const isBuilt = (program) => new RegExp(`\\w\\(${program}\\b`).test(buildFiles);
 const tests = new Set(sources.filter((f) => f.startsWith('tests/')).flatMap((f) =>
     [...text(f).matchAll(/\bTEST(?:_F|_P)?\(\s*(\w+),\s*(\w+)\s*\)/g)].map((m) => `${m[1]}.${m[2]}`)));
-const scripts = files.filter((f) => /^deploy\/(\w+|cluster\/\w+)$/.test(f) || f.endsWith('.sh')).map(text).join('\n');
+const scripts = files.filter((f) => /^(deploy\/(\w+|cluster\/\w+)|examples\/.*\.py)$/.test(f) || f.endsWith('.sh')).map(text).join('\n');
 
 /** What a run's folder holds: `logging/` and `tools/` write it. */
 const OF_A_RUN = new Set(['run_spec.pbtxt', 'scenario.pbtxt']);

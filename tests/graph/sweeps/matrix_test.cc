@@ -65,8 +65,8 @@ TEST_F(MatrixTest, HasEveryCheckOfEveryRun) {
   const std::vector<Row>& cell = cells.at("pushed without_balancing ");
   ASSERT_EQ(checks.size(), cell.size());
   for (size_t i = 0; i < cell.size(); ++i) {
-    EXPECT_EQ(cell[i].at("metric"), checks[i]["name"]);
-    EXPECT_EQ(cell[i].at("label"), checks[i]["label"]);
+    EXPECT_EQ(cell[i].at("metric"), checks[i]["name"].get<std::string>());
+    EXPECT_EQ(cell[i].at("label"), checks[i]["label"].get<std::string>());
     EXPECT_EQ(std::stod(cell[i].at("measured")), checks[i]["measured"].get<double>());
     EXPECT_EQ(cell[i].at("check_passed"), checks[i]["passed"].get<bool>() ? "true" : "false");
   }
