@@ -52,8 +52,7 @@ class WrenchObserver {
   const Wrenches& wrenches() const { return wrenches_; }
   const Covariance& covariance() const { return covariance_; }
   /// The covariance without what the low-pass lags behind, as it is of wrenches that do not change.
-  /// Of a foot that hangs free, or did a moment ago, it is as small as what the foot seemed to
-  /// carry.
+  /// It is as small as what the foot seemed to carry where that hangs free, or did a moment ago.
   const Covariance& settled_covariance() const { return settled_covariance_; }
   /// Whether the foot was seen to hang free at the last Observe that learns.
   bool free(robot::Foot foot) const { return free_foot_[foot].free(); }

@@ -48,8 +48,8 @@ constexpr double kJointReserve = 0.1;
 // swing was seen to be misjudged by 0.05, by more than three standard deviations.
 constexpr double kObservedLoad = 0.15;
 
-// ωT of a walk's step. Fitted: with 1.1 and 1.5 as many robots walk; G1 stands 136 of 192 pushes in
-// a walk with 1.3, 127 with 1.1 and 112 with 1.5.
+// ωT of a walk's step. Fitted: of 64 runs 56, 57 and 60 stand with 1.1, 1.3 and 1.5; G1 stands 136
+// of 192 pushes in a walk with 1.3, 127 with 1.1 and 112 with 1.5.
 constexpr double kStride = 1.3;
 // Share of g with which a commanded velocity is approached, and rad/s², the same of a turn rate:
 // some steps to full speed, each within reach.

@@ -119,7 +119,7 @@ class StepPlanner : public Component, public Operated {
   bool recovers_ = false;  // steps are made
   stepping::Recovery recovery_;
   bool walks_ = false;    // where it is told to, with steps of fixed times
-  bool strides_ = false;  // the same with the recovery's steps
+  bool strides_ = false;  // it walks by the recovery's steps
   stepping::Walk walk_;
   WalkCommands walk_commands_;
   FootstepReport footstep_report_;

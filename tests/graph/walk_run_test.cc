@@ -71,7 +71,7 @@ TEST(WalkRun, ByTheStepsOfARecoveryInEachEngine) {
   }
 }
 
-// What stands 31 of 32 times on G1: the paper's robot is pushed as hard, from all sides.
+// The paper's robot takes a push of 0.08 m √(g h) from each of four sides without a fall.
 TEST(WalkRun, APushInAWalkMovesTheFeet) {
   for (const char* side : {"1,0", "0,1", "-1,0", "0,-1"}) {
     const std::string direction = side;

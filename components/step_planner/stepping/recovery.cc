@@ -100,14 +100,7 @@ bool Recovery::Update(const StepInput& input) {
         together_asked_ = false;
         together_at_ = -1;
         plan_ = plan;
-        if (num_steps_ == 0) standing_height_ = input.com_height - input.sole[0].translation().z();
-        height_.Begin(input.com_height);
-        steps_now_ = 0;
-        in_contact_ = input.in_contact;
-        shift_from_ = state.pendulum.capture_point();
-        cop_from_ = output_.cop = shift_from_;
-        since_ = time;
-        stage_ = Stage::kShifting;
+        BeginShift(input, state);
       }
       step_helps_ = true;
       if (spec_.watched_margin >= 0 && stage_ == Stage::kIdle && excess > -spec_.watched_margin) {
@@ -248,12 +241,7 @@ Vector2d Recovery::WalkingPoint(const StepInput& input, const StepState& state, 
   return choice_.StridePoint(with, stance, gait(state), left, support) - body;
 }
 
-void Recovery::SetOff(const StepInput& input, const StepState& state) {
-  // The foot of the side that it goes to is the first.
-  const double out = command_.velocity.y() != 0 ? command_.velocity.y() : command_.turn_rate;
-  plan_ = StepPlan();
-  plan_.foot = out > 0 ? Foot::kLeft : Foot::kRight;
-  reason_ = StepReason::kWalk;
+void Recovery::BeginShift(const StepInput& input, const StepState& state) {
   if (num_steps_ == 0) standing_height_ = input.com_height - input.sole[0].translation().z();
   height_.Begin(input.com_height);
   steps_now_ = 0;
@@ -262,6 +250,15 @@ void Recovery::SetOff(const StepInput& input, const StepState& state) {
   cop_from_ = output_.cop = shift_from_;
   since_ = input.time;
   stage_ = Stage::kShifting;
+}
+
+void Recovery::SetOff(const StepInput& input, const StepState& state) {
+  // The foot of the side that it goes to is the first.
+  const double out = command_.velocity.y() != 0 ? command_.velocity.y() : command_.turn_rate;
+  plan_ = StepPlan();
+  plan_.foot = out > 0 ? Foot::kLeft : Foot::kRight;
+  reason_ = StepReason::kWalk;
+  BeginShift(input, state);
   BeginTurning(state);
 }
 

@@ -115,6 +115,8 @@ class Recovery {
   /// carries.
   Eigen::Vector2d WalkingPoint(const StepInput& input, const StepState& state, Foot stance,
                                const balance::ConvexPolygon& support, double left) const;
+  /// From rest on both feet the capture point leaves for another place.
+  void BeginShift(const StepInput& input, const StepState& state);
   /// From rest: the capture point goes to where the first step begins.
   void SetOff(const StepInput& input, const StepState& state);
   /// The body's heading follows the feet's from now on.

@@ -96,7 +96,7 @@ class StepChoice {
   /// The step of `foot` that goes on with `gait`, its touch-down `time` s from now: where the
   /// capture point has its nominal place from the sole.
   StepPlan StrideAt(const StepState& state, Foot foot, const Gait& gait, double time) const;
-  /// The same, whose time is the gait's, sooner where the legs do not reach so far, later where the
+  /// That step, its time the gait's: sooner where the legs do not reach so far, later where the
   /// swing takes longer. `unload`: s, until the foot leaves the ground.
   StepPlan Stride(const StepState& state, Foot foot, const Gait& gait, double unload) const;
   /// m, world: the capture point as the other foot leaves the ground.
