@@ -68,41 +68,47 @@ Bounds MomentBounds(const Vector6d& resultant, const FootArray<Eigen::Vector3d>&
   return bounds;
 }
 
-// m that a sole's reach is short of its edge, so that an area is left to MoveIntoSoles.
-constexpr double kReachReserve = 1e-5;
-
-/// The furthest that the sole, turned by `rotation` into O's plane, reaches along `normal`, m.
-double Reach(const ConvexPolygon& sole, const Eigen::Matrix3d& rotation,
-             const Eigen::Vector2d& normal) {
-  const Eigen::Vector2d in_sole = rotation.topLeftCorner<2, 2>().transpose() * normal;
-  double reach = -HUGE_VAL;
-  for (const Eigen::Vector2d& corner : sole.corners()) reach = std::max(reach, in_sole.dot(corner));
-  return reach - kReachReserve;
-}
+// m that a sole's reach is short of its edge, so that an area is left to MoveIntoSoles: what M_z of
+// soles tilted by 0.02 rad has about x and y.
+constexpr double kReachReserve = 5e-4;
 
 /// MomentBounds where each foot has a centre of pressure of its own: η S_r + (1 − η) S_l holds what
-/// both can have together, and along each edge of either sole that sum reaches as far as
-/// η h_r + (1 − η) h_l.
+/// both can have together. S is the polygon of moments (x, y in O) that the whole force has about a
+/// sole's centre from within that sole, which may be tilted, and the sum reaches along the normal
+/// of each edge of either as far as η h_r + (1 − η) h_l.
 Bounds FreeMomentBounds(const Vector6d& resultant, const FootArray<Eigen::Vector3d>& position,
                         const FootArray<Eigen::Matrix3d>& rotation, const SoleLimits& limits,
                         const FootArray<ConvexPolygon>& sole) {
-  const LinearMoment moment = OwnMoments(resultant, position);
-  const double load = std::abs(resultant[2]);
+  const LinearMoment own = OwnMoments(resultant, position);
+  const Eigen::Vector3d force = resultant.head<3>();
+  FootArray<Eigen::Matrix2d> moment;  // of a point of each sole, m, its frame: N
+  for (const Foot foot : kFeet) {
+    for (const int axis : {0, 1}) {
+      moment[foot].col(axis) = rotation[foot].col(axis).cross(force).head<2>();
+    }
+  }
   Bounds bounds;
   for (const Foot foot : kFeet) {
     for (const HalfPlane& edge : limits[foot].edges.planes()) {
-      const Eigen::Vector2d normal =
-          (rotation[foot].topLeftCorner<2, 2>() * edge.normal).normalized();
-      const auto reach = [&](Foot of) { return Reach(sole[of], rotation[of], normal) * load; };
+      const Eigen::Vector2d along =
+          moment[foot] * Eigen::Vector2d(-edge.normal.y(), edge.normal.x());
+      Eigen::Vector2d normal = Eigen::Vector2d(-along.y(), along.x()).normalized();
+      if (normal.dot(moment[foot] * edge.normal) < 0) normal = -normal;
+      const auto reach = [&](Foot of) {
+        const Eigen::Vector2d in_sole = moment[of].transpose() * normal;
+        double most = -HUGE_VAL;
+        for (const Eigen::Vector2d& corner : sole[of].corners()) {
+          most = std::max(most, in_sole.dot(corner));
+        }
+        return most - kReachReserve * in_sole.norm();
+      };
       const double right = reach(Foot::kRight), left = reach(Foot::kLeft);
-      const Eigen::Vector2d turned(-normal.y(), normal.x());
-      bounds.AddBelow(turned.dot(moment.slope.head<2>()) - (right - left),
-                      turned.dot(moment.offset.head<2>()), left, "edge");
+      bounds.AddBelow(normal.dot(own.slope.head<2>()) - (right - left),
+                      normal.dot(own.offset.head<2>()), left, "edge");
     }
     const Eigen::Matrix3d to_sole = rotation[foot].transpose();
-    bounds.AddBoth(to_sole.row(2).dot(moment.slope), to_sole.row(2).dot(moment.offset),
-                   limits[foot].yaw_friction * std::abs(to_sole.row(2).dot(resultant.head<3>())),
-                   "yaw");
+    bounds.AddBoth(to_sole.row(2).dot(own.slope), to_sole.row(2).dot(own.offset),
+                   limits[foot].yaw_friction * std::abs(to_sole.row(2).dot(force)), "yaw");
   }
   return bounds;
 }

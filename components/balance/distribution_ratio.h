@@ -43,7 +43,7 @@ RatioInterval FeasibleRatio(const Vector6d& resultant, const FootArray<Eigen::Ve
 
 /// The same where each foot may have a centre of pressure of its own, as MoveIntoSoles gives it: of
 /// soles that are not alike more than of one that both have. `sole`: the polygons of `limits`'
-/// edges, which both have. Exact for soles parallel to O's plane.
+/// edges, which both have. Exact but for the part of M_z that a tilted sole has about x and y.
 RatioInterval FreeRatio(const Vector6d& resultant, const FootArray<Eigen::Isometry3d>& foot,
                         const SoleLimits& limits, const FootArray<ConvexPolygon>& sole,
                         double eta_min, double eta_max);

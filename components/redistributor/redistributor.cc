@@ -181,7 +181,8 @@ int8_t Redistributor::ComputeDouble(const Tick& tick) {
   balance::RatioInterval interval = allowed(eta_min_, eta_max_);
   // The least share holds outside a ramp: on one a foot may carry nothing.
   const bool ramped = transition_ && support_plan_->transition != support_plan_t::TRANSITION_NONE;
-  if (!interval.feasible && ramped) interval = allowed(0, 1);
+  const balance::RatioInterval any_share = ramped ? allowed(0, 1) : interval;
+  if (!interval.feasible) interval = any_share;
   interval = KeepLanded(interval);
   const bool pressed = resultant[2] < 0;
   out.eta_feasible = interval.feasible && pressed ? 1 : 0;
@@ -191,8 +192,8 @@ int8_t Redistributor::ComputeDouble(const Tick& tick) {
   if (redistribution_ && pressed) {
     const double free_ratio =
         balance::SelectRatio(interval, resultant, sole_in_o, double_support_, eta_min_, eta_max_);
-    out.eta =
-        RampedRatio(ratio_moves_.Ratio(tick.time, interval, free_ratio), resultant, sole_in_o);
+    out.eta = RampedRatio(ratio_moves_.Ratio(tick.time, interval, free_ratio), any_share, resultant,
+                          sole_in_o);
     Wrenches desired = balance::DistributeResultant(resultant, sole_in_o, out.eta);
     if (own_soles) balance::MoveIntoSoles(sole_in_o, sole_, &desired);
     Eigen::Matrix<double, 12, 1> change;
@@ -227,7 +228,8 @@ balance::RatioInterval Redistributor::KeepLanded(balance::RatioInterval interval
   return interval;
 }
 
-double Redistributor::RampedRatio(double free_ratio, const Vector6d& resultant,
+double Redistributor::RampedRatio(double free_ratio, const balance::RatioInterval& both,
+                                  const Vector6d& resultant,
                                   FootArray<Eigen::Isometry3d> sole_in_o) const {
   const support_plan_t& plan = *support_plan_;
   if (!transition_ || plan.transition == support_plan_t::TRANSITION_NONE) return free_ratio;
@@ -235,8 +237,9 @@ double Redistributor::RampedRatio(double free_ratio, const Vector6d& resultant,
   const Foot light = robot::FootAt(plan.transition_foot);
   const double ramped =
       balance::TransitionRatio(free_ratio, light, unloading, plan.transition_progress);
-  // Only the loaded foot's conditions count: with both soles turned like it, the other's are the
-  // same.
+  if (both.feasible) return std::clamp(ramped, both.min, both.max);
+  // Then only the loaded foot's conditions count: with both soles turned like it, the other's are
+  // the same.
   sole_in_o[light].linear() = sole_in_o[Other(light)].linear();
   const balance::RatioInterval allowed =
       balance::FeasibleRatio(resultant, sole_in_o, double_support_[Other(light)], 0.0, 1.0);

@@ -45,8 +45,10 @@ class Redistributor : public Component, public Operated {
   int8_t ComputeSingle(const robot::FootArray<bool>& in_contact);
   /// `interval` less the ratios that leave a landed foot less than its share; never empty.
   balance::RatioInterval KeepLanded(balance::RatioInterval interval);
-  /// η on the ramp of section 6.2, kept inside what the conditions of the loaded foot allow.
-  double RampedRatio(double free_ratio, const balance::Vector6d& resultant,
+  /// η on the ramp of section 6.2, within `both`, what the conditions of both feet allow; where no
+  /// ratio keeps them all, within what those of the loaded foot allow.
+  double RampedRatio(double free_ratio, const balance::RatioInterval& both,
+                     const balance::Vector6d& resultant,
                      robot::FootArray<Eigen::Isometry3d> sole_in_o) const;
   /// Adds what answers the measured wrenches to the command; `sole_in_o` as distributed, `desired`
   /// in the sole frames.

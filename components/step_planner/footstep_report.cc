@@ -13,8 +13,8 @@ namespace {
 
 using robot::Foot;
 using robot::Other;
+using stepping::QuasiStaticWalk;
 using stepping::Stage;
-using stepping::Walk;
 using stepping::WalkStage;
 using Report = ::steps::footsteps_t;
 
@@ -22,7 +22,7 @@ constexpr int kCorners = stepping::kRegionDirections;
 constexpr double kRegionPeriod = 0.02;  // s: what looks on draws no faster
 constexpr double kLeastHeight = 0.1;    // m, of the COM above the sole: below, it has fallen
 
-static_assert(sizeof(Report::x) / sizeof(double) >= Walk::kPlannedSteps);
+static_assert(sizeof(Report::x) / sizeof(double) >= QuasiStaticWalk::kPlannedSteps);
 static_assert(sizeof(Report::region_x) / sizeof(double) ==
               (stepping::kMostRegionSteps + 1) * kCorners);
 
@@ -32,7 +32,7 @@ bool UnderWay(const stepping::Recovery& recovery) {
 
 /// The foot that carries, or is to while the other steps; none: both do.
 std::optional<Foot> Stance(const FootstepInput& input, const stepping::Recovery* recovery,
-                           const Walk* walk) {
+                           const QuasiStaticWalk* walk) {
   if (walk != nullptr && walk->active()) {
     if (walk->stage() == WalkStage::kStopping) return {};
     return Other(walk->stepping_foot());
@@ -53,14 +53,14 @@ void Put(int i, Foot foot, const Eigen::Vector2d& at, double yaw, double ground,
   out->touch_down[i] = std::max(0.0, left);
 }
 
-void ReportPlanned(const FootstepInput& input, const stepping::Recovery* recovery, const Walk* walk,
-                   Report* out) {
+void ReportPlanned(const FootstepInput& input, const stepping::Recovery* recovery,
+                   const QuasiStaticWalk* walk, Report* out) {
   int count = 0;
   if (walk != nullptr && walk->active()) {
-    std::array<Walk::PlannedStep, Walk::kPlannedSteps> planned;
+    std::array<QuasiStaticWalk::PlannedStep, QuasiStaticWalk::kPlannedSteps> planned;
     const int all = walk->Planned(&planned);
     const double ground = input.sole[Other(walk->stepping_foot())].translation().z();
-    for (const Walk::PlannedStep& step : planned) {
+    for (const QuasiStaticWalk::PlannedStep& step : planned) {
       if (count == all) break;
       Put(count++, step.foot, step.at.position, step.at.yaw, ground, step.touch_down - input.time,
           out);
@@ -72,18 +72,19 @@ void ReportPlanned(const FootstepInput& input, const stepping::Recovery* recover
         out);
   }
   out->planned = static_cast<int8_t>(count);
-  for (int i = count; i < Walk::kPlannedSteps; ++i) Put(i, Foot::kRight, {0, 0}, 0, 0, 0, out);
+  for (int i = count; i < QuasiStaticWalk::kPlannedSteps; ++i)
+    Put(i, Foot::kRight, {0, 0}, 0, 0, 0, out);
 }
 
 }  // namespace
 
-FootstepReport::FootstepReport(const stepping::Recovery* recovery, const Walk* walk) {
+FootstepReport::FootstepReport(const stepping::Recovery* recovery, const QuasiStaticWalk* walk) {
   if (recovery != nullptr) recovery_regions_ = stepping::RegionFinder(recovery->choice());
   if (walk != nullptr) walk_regions_ = stepping::RegionFinder(walk->choice());
 }
 
 void FootstepReport::Update(const FootstepInput& input, const stepping::Recovery* recovery,
-                            const Walk* walk, Report* out) {
+                            const QuasiStaticWalk* walk, Report* out) {
   ReportPlanned(input, recovery, walk, out);
   const std::optional<Foot> stance = Stance(input, recovery, walk);
   if (stance == stance_ && input.time < since_ + kRegionPeriod - kTimeTolerance) return;

@@ -6,8 +6,8 @@
 
 #include "components/framework/state_archive.h"
 #include "components/step_planner/stepping/capturability.h"
+#include "components/step_planner/stepping/quasi_static_walk.h"
 #include "components/step_planner/stepping/recovery.h"
-#include "components/step_planner/stepping/walk.h"
 #include "steps/footsteps_t.hpp"
 
 namespace poise {
@@ -26,10 +26,10 @@ class FootstepReport {
  public:
   FootstepReport() = default;
   /// `recovery`, `walk`: null where they are not enabled, as below.
-  FootstepReport(const stepping::Recovery* recovery, const stepping::Walk* walk);
+  FootstepReport(const stepping::Recovery* recovery, const stepping::QuasiStaticWalk* walk);
 
   void Update(const FootstepInput& input, const stepping::Recovery* recovery,
-              const stepping::Walk* walk, ::steps::footsteps_t* out);
+              const stepping::QuasiStaticWalk* walk, ::steps::footsteps_t* out);
   void Archive(StateArchive* archive) { archive->Show(since_, stance_); }
 
  private:

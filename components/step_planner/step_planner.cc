@@ -61,7 +61,7 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   landing_ = robot::FootArray<Landing>(Landing(contact_));
   contact_loss_ = robot::FootArray<ContactLoss>(ContactLoss(contact_));
   step_ = StepDetector(kNeededExcess, kNeededPersistence);
-  strides_ = config.walk().enabled() && config.walk().dynamic();
+  strides_ = config.walk().enabled() && !config.walk().quasi_static();
   recovers_ = config.recovery().enabled() || strides_;
   if (recovers_) {
     const HipStrategyConfig& hip = config.hip_strategy();
@@ -69,7 +69,7 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
                              hip.enabled() ? hip.start() : -1);
   }
   walks_ = config.walk().enabled() && !strides_;
-  if (walks_) walk_ = MakeWalk(config.walk(), config.contact(), *model_);
+  if (walks_) walk_ = MakeQuasiStaticWalk(config.walk(), config.contact(), *model_);
   footstep_report_ = FootstepReport(recovers_ ? &recovery_ : nullptr, walks_ ? &walk_ : nullptr);
   walk_commands_ = WalkCommands(config.walk());
   state_ = robot::RobotState(model_->num_joints());

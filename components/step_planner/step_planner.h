@@ -118,9 +118,9 @@ class StepPlanner : public Component, public Operated {
   StepDetector step_;
   bool recovers_ = false;  // steps are made
   stepping::Recovery recovery_;
-  bool walks_ = false;    // where it is told to, with steps of fixed times
+  bool walks_ = false;    // quasi-statically, where it is told to
   bool strides_ = false;  // it walks by the recovery's steps
-  stepping::Walk walk_;
+  stepping::QuasiStaticWalk walk_;
   WalkCommands walk_commands_;
   FootstepReport footstep_report_;
   /// What an operator has told the robot to walk.

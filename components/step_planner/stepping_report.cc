@@ -85,7 +85,7 @@ int8_t WalkCode(stepping::WalkStage stage) {
 
 }  // namespace
 
-void ReportWalking(const stepping::Walk& walk, double time,
+void ReportWalking(const stepping::QuasiStaticWalk& walk, double time,
                    const robot::FootArray<Eigen::Isometry3d>& sole, support_plan_t* plan) {
   plan->stepping = WalkCode(walk.stage());
   if (!walk.active()) {

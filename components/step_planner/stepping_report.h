@@ -3,8 +3,8 @@
 
 #include <Eigen/Geometry>
 
+#include "components/step_planner/stepping/quasi_static_walk.h"
 #include "components/step_planner/stepping/recovery.h"
-#include "components/step_planner/stepping/walk.h"
 #include "poise/support_plan_t.hpp"
 
 namespace poise {
@@ -20,7 +20,7 @@ void ReportStepping(const stepping::Recovery& recovery, double time,
                     const robot::FootArray<Eigen::Isometry3d>& sole, support_plan_t* plan);
 
 /// The same of walking, and walk_velocity.
-void ReportWalking(const stepping::Walk& walk, double time,
+void ReportWalking(const stepping::QuasiStaticWalk& walk, double time,
                    const robot::FootArray<Eigen::Isometry3d>& sole, support_plan_t* plan);
 
 /// What is walked, into `plan`.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "components/framework/configuration/configuration.h"
@@ -51,6 +52,10 @@ constexpr double kMostAhead = 0.08;
 // as on hard ground.
 constexpr double kSinkSpeed = 0.04;
 
+// Ratio: share of the weight with which a foot that has touched is pressed down, so that the sole
+// lies down on what it has found. More than 0.4 would lift the other foot off its middle.
+constexpr double kPressShare = 0.1;
+
 // The numbers of the gait of the paper's robot, whose COM stands 0.75 m high. Another robot's is
 // the same in units of g and of its own height, so that as much of the capture point's error grows
 // in a step (RobotScale).
@@ -58,7 +63,8 @@ constexpr double kDefaultHeight = 0.75;  // m
 constexpr double kStart = 0.8;           // s in which the COM leaves the middle for the stance foot
 constexpr double kFreeze = 0.1;          // s before touch-down: a foothold that moves then jerks
 constexpr double kStillTime = 0.3;       // s of rest until it stands: a swing of the COM is longer
-constexpr double kAdjustFrom = 0.01;     // m of error that the sole corrects without a foothold
+constexpr double kWidest = 0.12;         // m to the side in a step, beyond the feet side by side
+constexpr double kMostTurn = 0.35;       // rad in a step, not scaled: a hip turns by as much
 constexpr double kMostReturn = 0.03;     // m a step back to the course: more would be a lurch
 constexpr double kReachLowering = 0.06;  // m below standing: footholds in reach leave knees bent
 constexpr double kStillDistance = 0.02;  // m from the soles' middle: as the estimate is known to
@@ -93,15 +99,6 @@ class RobotScale {
   double length_, time_;
 };
 
-/// m, the longest step and the widest.
-struct StepSize {
-  double longest, widest;
-
-  StepSize(const WalkConfig& config, const RobotScale& scale)
-      : longest(config.has_longest() ? config.longest() : scale.Length(config.longest())),
-        widest(config.has_widest() ? config.widest() : scale.Length(config.widest())) {}
-};
-
 /// The motion of this robot's steps: gap and gain are what a foot and an estimate are off by.
 StepMotion WalkMotion(const WalkConfig& config, const RobotScale& scale) {
   auto motion = GroupDefault<StepMotion, WalkConfig>("motion");
@@ -120,10 +117,6 @@ StepMotion WalkMotion(const WalkConfig& config, const RobotScale& scale) {
 /// the ground.
 double LiftOffDistance(const robot::RobotModel& model, const stepping::StepLimits& limits) {
   return 0.5 * (LeastInnerRadius(model) - limits.sole_margin);
-}
-
-double Period(const StepMotion& motion) {
-  return motion.unload() + motion.swing() + motion.settle() + motion.load();
 }
 
 /// Throws ConfigError on what is given and this robot's legs cannot do. `motion`: with the robot's
@@ -151,13 +144,6 @@ void CheckLegs(const WalkConfig& given, const StepMotion& motion, const robot::R
                                   "COM {:.3f} m below standing: give 0 to that",
                                   given.longest(), model.name(), longest, reach.lowering()));
   }
-  const double widest = WidestStance(reach) - spacing;
-  if (given.has_widest() && given.widest() > widest) {
-    throw ConfigError("walk.widest",
-                      fmt::format("is {} m; the legs of robot '{}' span {:.3f} m to the side "
-                                  "beyond the soles side by side: give 0 to that",
-                                  given.widest(), model.name(), std::max(0.0, widest)));
-  }
 }
 
 /// What a step of a walk comes to at most.
@@ -167,14 +153,14 @@ struct StrideSize {
   std::array<const char*, 3> limit;   ///< what says so, of each
 };
 
-StrideSize FixedStride(const WalkConfig& config, const robot::RobotModel& model) {
-  const RobotScale scale(model);
-  const StepSize size(config, scale);
-  return {size.longest,
-          size.widest,
-          config.most_turn(),
-          Period(WalkMotion(config, scale)),
-          {"`longest` allows", "`widest` allows", "`most_turn` allows"}};
+StrideSize QuasiStaticStride(const WalkConfig& config, const robot::RobotModel& model) {
+  const stepping::QuasiStaticSpec spec =
+      MakeQuasiStaticSpec(config, ContactConfirmation(), model, MakeWalkChoice(config, model));
+  return {spec.step.longest,
+          spec.step.widest,
+          spec.step.most_turn,
+          spec.period(),
+          {"`longest` allows", "the legs span", "a foot turns"}};
 }
 
 StrideSize DynamicStride(const robot::RobotModel& model) {
@@ -249,75 +235,64 @@ stepping::StepChoice MakeWalkChoice(const WalkConfig& config, const robot::Robot
   limits.sole_margin = kSoleMarginShare * LeastInnerRadius(model);
   limits.spacing = std::max(robot::StandingSpacing(model), reach.least_spacing());
   CheckLegs(config, motion, model, reach, limits.spacing);
-  if (config.quasi_static()) {
-    CheckStanceLegs(LiftOffDistance(model, limits), model, reach, height, kJointReserve);
-  }
+  CheckStanceLegs(LiftOffDistance(model, limits), model, reach, height, kJointReserve);
   return {model, reach, limits};
 }
 
-stepping::WalkSpec MakeWalkSpec(const WalkConfig& config, const ContactConfirmation& contact,
-                                const robot::RobotModel& model,
-                                const stepping::StepChoice& choice) {
+stepping::QuasiStaticSpec MakeQuasiStaticSpec(const WalkConfig& config,
+                                              const ContactConfirmation& contact,
+                                              const robot::RobotModel& model,
+                                              const stepping::StepChoice& choice) {
   const RobotScale scale(model);
   const StepMotion motion = WalkMotion(config, scale);
-  const StepSize size(config, scale);
   const double height = robot::StandingHeight(model), radius = LeastInnerRadius(model);
   const double weight = robot::kGravity * model.total_mass();
-  stepping::WalkSpec spec;
+  stepping::QuasiStaticSpec spec;
   spec.start = scale.Time(kStart);
   spec.unload = motion.unload();
   spec.swing = motion.swing();
   spec.settle = motion.settle();
   spec.load = motion.load();
-  spec.step = {choice.limits().spacing, choice.reach().least_spacing(), size.longest, size.widest,
-               config.most_turn()};
+  spec.step = {choice.limits().spacing, choice.reach().least_spacing(),
+               config.has_longest() ? config.longest() : scale.Length(config.longest()),
+               scale.Length(kWidest), kMostTurn};
   spec.acceleration = kAcceleration;
   spec.turn_acceleration = scale.TurnAcceleration(kTurnAcceleration);
-  spec.foot = {motion.clearance(),
-               scale.Speed(kTouchSpeed),
-               scale.Time(kFreeze),
-               kRiseShare * motion.clearance(),
-               config.quasi_static() ? kAcrossShare : 1,
-               config.quasi_static() ? kWaitShare : 0};
+  spec.foot = {motion.clearance(),  scale.Speed(kTouchSpeed),
+               scale.Time(kFreeze), kRiseShare * motion.clearance(),
+               kAcrossShare,        kWaitShare};
   spec.touch_load = contact.touch_load();
-  spec.release_load = contact.release_load();
   spec.touch_duration = kTouchDuration;
   spec.search_depth = contact.search_depth();
   spec.gain = motion.gain();
-  spec.offset_rate =
-      config.has_offset_rate() ? config.offset_rate() : scale.Rate(config.offset_rate());
   spec.most_offset = kOffsetShare * radius;
-  spec.adjust_from = scale.Length(kAdjustFrom);
   spec.com_lowering = motion.com_lowering();
   spec.height_rate = motion.height_rate();
   spec.yaw_rate = scale.Rate(kYawRate);
   spec.still_distance = scale.Length(kStillDistance);
   spec.still_speed = scale.Speed(kStillSpeed);
   spec.still_time = scale.Time(kStillTime);
-  spec.quasi_static = config.quasi_static();
-  spec.press_share = config.press();
-  spec.press_load =
-      std::max(config.press() * robot::kGravity * model.total_mass(), spec.touch_load);
+  spec.press_share = kPressShare;
+  spec.press_load = std::max(kPressShare * weight, spec.touch_load);
   spec.lift_off_distance = LiftOffDistance(model, choice.limits());
   spec.most_return = scale.Length(kMostReturn);
-  spec.stand_apart = config.stand_apart();
   spec.load_lead = kLoadLeadShare * radius;
   spec.weight = weight;
   spec.most_sinking = kMostSinking * height;
   spec.most_ahead = kMostAhead * height;
   spec.sink_speed = kSinkSpeed;
   spec.soft = kSoftShare * radius;
-  spec.slowest_swing = config.slowest_swing();
   for (const KnownGroundConfig& edge : config.ground()) {
     spec.ground.Add(robot::FootAt(edge.foot()), edge.from(), edge.height());
   }
   return spec;
 }
 
-stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& contact,
-                        const robot::RobotModel& model) {
+stepping::QuasiStaticWalk MakeQuasiStaticWalk(const WalkConfig& config,
+                                              const ContactConfirmation& contact,
+                                              const robot::RobotModel& model) {
   const stepping::StepChoice choice = MakeWalkChoice(config, model);
-  return {choice, MakeWalkSpec(config, contact, model, choice)};
+  return {choice, MakeQuasiStaticSpec(config, contact, model, choice)};
 }
 
 std::vector<std::string> WalkWarnings(const WalkConfig& config, const robot::RobotModel& model) {
@@ -328,7 +303,8 @@ std::vector<std::string> WalkWarnings(const WalkConfig& config, const robot::Rob
     }
     return warnings;
   }
-  const StrideSize size = config.dynamic() ? DynamicStride(model) : FixedStride(config, model);
+  const StrideSize size =
+      config.quasi_static() ? QuasiStaticStride(config, model) : DynamicStride(model);
   for (int i = 0; i < config.command_size(); ++i) {
     const WalkCommandConfig& command = config.command(i);
     if (command.stop()) continue;
@@ -350,8 +326,12 @@ std::vector<std::string> WalkWarnings(const WalkConfig& config, const robot::Rob
           part.in_a_step, part.unit, part.steps, part.count == 1 ? "takes" : "take", time));
     }
   }
-  if (config.slowest_swing() > 1 && !config.quasi_static()) {
-    warnings.emplace_back("walk.slowest_swing has no effect without walk.quasi_static=true");
+  if (config.quasi_static()) return warnings;
+  for (const auto& [name, given] : {std::pair{"motion", config.has_motion()},
+                                    {"longest", config.has_longest()},
+                                    {"ground", config.ground_size() > 0}}) {
+    if (!given) continue;
+    warnings.push_back(fmt::format("walk.{} has no effect without walk.quasi_static=true", name));
   }
   return warnings;
 }

@@ -6,7 +6,7 @@
 
 #include "components/robot/robot_model.h"
 #include "components/step_planner/step_planner.pb.h"
-#include "components/step_planner/stepping/walk.h"
+#include "components/step_planner/stepping/quasi_static_walk.h"
 
 namespace poise {
 
@@ -14,18 +14,21 @@ namespace poise {
 /// number has been held to its rule already (CheckFields).
 void CheckWalkConfig(const WalkConfig& config);
 
-/// Reach and spacing of this robot's walk, whose COM stands at its standing height. Throws
-/// ConfigError when its legs reach nothing or not what is configured.
+/// Reach and spacing of this robot's quasi-static walk, whose COM stands at its standing height.
+/// Throws ConfigError when its legs reach nothing or not what is configured.
 stepping::StepChoice MakeWalkChoice(const WalkConfig& config, const robot::RobotModel& model);
 
-/// The numbers of this robot's walk. What nobody gave is that of the paper's robot in units of g
-/// and of the standing COM's height. `choice`: MakeWalkChoice's.
-stepping::WalkSpec MakeWalkSpec(const WalkConfig& config, const ContactConfirmation& contact,
-                                const robot::RobotModel& model, const stepping::StepChoice& choice);
+/// The numbers of this robot's quasi-static walk. What nobody gave is that of the paper's robot in
+/// units of g and of the standing COM's height. `choice`: MakeWalkChoice's.
+stepping::QuasiStaticSpec MakeQuasiStaticSpec(const WalkConfig& config,
+                                              const ContactConfirmation& contact,
+                                              const robot::RobotModel& model,
+                                              const stepping::StepChoice& choice);
 
 /// Both. Throws as MakeWalkChoice.
-stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& contact,
-                        const robot::RobotModel& model);
+stepping::QuasiStaticWalk MakeQuasiStaticWalk(const WalkConfig& config,
+                                              const ContactConfirmation& contact,
+                                              const robot::RobotModel& model);
 
 /// What this robot will not walk as it is configured, and settings without effect: a sentence each.
 std::vector<std::string> WalkWarnings(const WalkConfig& config, const robot::RobotModel& model);

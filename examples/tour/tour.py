@@ -94,7 +94,7 @@ def run(task):
     rng = np.random.default_rng(number)
     joints = joints_of(options.robot)
     changes = {"robot": str(pathlib.Path(options.robot).resolve()), "step_planner.walk.command": None}
-    env = poise.Environment("walk_dynamic", changes, engine=options.world, seed=number)
+    env = poise.Environment("walk", changes, engine=options.world, seed=number)
     env.step(1)
     names = sorted(joints)
     arms = None if options.arms_held else Arms(env, joints, rng)

@@ -122,7 +122,7 @@ class Environment:
         self._session.push(body, force, point, ticks)
 
     def walk(self, vx, vy=0.0, wz=0.0):
-        """m/s ahead, m/s and rad/s to the left, from the next tick on, in a scenario that walks, as `walk_dynamic`."""
+        """m/s ahead, m/s and rad/s to the left, from the next tick on, in a scenario that walks, as `walk`."""
         self._session.walk([float(vx), float(vy), float(wz)])
 
     def stand(self):

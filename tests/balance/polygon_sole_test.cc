@@ -417,6 +417,45 @@ TEST(PolygonSole, MirroredSolesCanDoWhatTheirHullPromises) {
   EXPECT_GT(needed, tried / 20);
 }
 
+// At the ends of the interval, where MoveIntoSoles has the least room: narrow soles turned by some
+// degrees and tilted by one, as they are while a foot that has landed is loaded.
+TEST(PolygonSole, TiltedSolesHoldTheirCentresOfPressureAtTheEndsOfTheInterval) {
+  std::mt19937 random(8);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  const std::vector<Vector2d> corners{
+      {-0.085, -0.025}, {0.085, -0.03}, {0.085, 0.03}, {-0.085, 0.025}};
+  const SoleLimits limits{Limits(Foot(corners), 0.0015), Limits(Foot(corners), 0.0015)};
+  const std::array<ConvexPolygon, 2> sole{CornersOf(limits[0].edges), CornersOf(limits[1].edges)};
+  int tried = 0, moved = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    Stand stand;
+    for (size_t i = 0; i < 2; ++i) {
+      stand.foot[i] = Eigen::Translation3d(0.2 * unit(random), i == 0 ? -0.14 : 0.14, 0) *
+                      Eigen::AngleAxisd(0.2 * unit(random), Eigen::Vector3d::UnitZ()) *
+                      Eigen::AngleAxisd(0.02 * unit(random), Eigen::Vector3d::UnitX()) *
+                      Eigen::AngleAxisd(0.02 * unit(random), Eigen::Vector3d::UnitY());
+    }
+    stand.resultant = Pressed({0.25 * unit(random), 0.17 * unit(random)}, 320);
+    stand.resultant.head<2>() = 30 * Vector2d(unit(random), unit(random));
+    const RatioInterval interval = FreeRatio(stand.resultant, stand.foot, limits, sole, 0, 1);
+    if (!interval.feasible || interval.max - interval.min < 0.01) continue;
+    ++tried;
+    for (const double eta : {interval.min, interval.max}) {
+      FootArray<Vector6d> share = DistributeResultant(stand.resultant, stand.foot, eta);
+      moved += !(robot::DistanceInside(Foot(corners), CenterOfPressure(share[0])) > 0.0015);
+      MoveIntoSoles(stand.foot, sole, &share);
+      for (size_t i = 0; i < 2; ++i) {
+        if (!(share[i][2] < -1)) continue;  // of a foot that carries nothing there is none
+        const double inside =
+            robot::DistanceInside(Foot(corners), CenterOfPressure(share[i])) - 0.0015;
+        EXPECT_GT(inside, -1e-6) << "foot " << i << ", eta " << eta << ", trial " << trial;
+      }
+    }
+  }
+  EXPECT_GT(tried, 300);
+  EXPECT_GT(moved, 100);
+}
+
 TEST(PolygonSole, RefusesWhatIsNoSole) {
   const auto says = [](const std::vector<Vector2d>& corners, const std::string& what) {
     const std::string problem = robot::SoleProblem(corners);

@@ -208,10 +208,10 @@ TEST_F(OperatorTest, FeetTogetherIsTakenWhereTheRobotStepsWhenPushed) {
   EXPECT_EQ(replay.exit_code, 0) << replay.output;
 }
 
-TEST_F(OperatorTest, WhoWalksByTheStepsOfARecoveryIsStoppedAndLedOn) {
+TEST_F(OperatorTest, WhoWalksIsStoppedAndLedOn) {
   const std::vector<std::string> still = {"--set", "step_planner.walk.command="};
-  std::vector<std::string> arguments = {"run",     "walk_dynamic", "--duration", "600",
-                                        "--quiet", "--force",      "--out",      run_};
+  std::vector<std::string> arguments = {"run",     "walk",    "--duration", "600",
+                                        "--quiet", "--force", "--out",      run_};
   arguments.insert(arguments.end(), still.begin(), still.end());
   program_ = std::make_unique<PoiseProgram>(arguments);
   ASSERT_TRUE(WaitForLog(run_, kUnderWay));

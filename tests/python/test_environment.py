@@ -38,7 +38,7 @@ class Steps(unittest.TestCase):
         self.assertFalse(np.array_equal(env["ROBOT_STATE"].q, first))
 
     def test_it_walks_where_it_is_told(self):
-        env = poise.Environment("walk_dynamic", {"step_planner.walk.command": "", "duration": 60})
+        env = poise.Environment("walk", {"step_planner.walk.command": "", "duration": 60})
         env.step(500)
         env.walk(0.3)
         env.step(2000)

@@ -260,7 +260,7 @@ void AddOperatorCommands(CLI::App* app, Command* command) {
       "m/s ahead and to the left, x,y, each within 1; steps and settings of the run allow less");
   CLI::Option* turn = walk->add_option("--turn", walk_options->turn, "rad/s to the left, within 1");
   walk->add_flag("--stop", walk_options->stop,
-                 "stand, with the feet side by side, or as they are with walk.stand_apart");
+                 "stand, with the feet side by side, or as they are with walk.quasi_static");
   walk->add_option("--run", walk_options->run, kWhichRun);
   walk->footer("Example: poise walk --velocity 0.1,0 --turn 0.1");
   walk->callback([walk_options, turn, command] {

@@ -8,7 +8,7 @@
 #include "components/robot/dynamics.h"
 #include "components/robot/posture.h"
 #include "components/step_planner/stepping/swing.h"
-#include "components/step_planner/walk_config.h"
+#include "components/step_planner/recovery_config.h"
 
 namespace poise {
 namespace {
@@ -41,12 +41,15 @@ class Step {
   Step(const robot::RobotModel& model, const RobotState& stance)
       : model_(model),
         height_(robot::StandingHeight(model)),
-        spec_(MakeWalkSpec({}, {}, model, MakeWalkChoice({}, model))),
-        spacing_(robot::StandingSpacing(model)),
+        spec_(MakeRecoverySpec({}, {}, model, -1)),
+        spacing_(MakeStepChoice({}, model).limits().spacing),
         nominal_(stance.joint_position) {}
 
-  double single() const { return spec_.single(); }
-  double both() const { return spec_.unload + spec_.load; }
+  /// s. The other foot leaves as the landed one has half of the load.
+  double both() const { return 0.5 * spec_.load; }
+  double single() const {
+    return spec_.stride * std::sqrt((height_ - spec_.walk_lowering) / robot::kGravity) - both();
+  }
 
   /// The robot on the sole of `stance`, whose frame lies at the origin, at each sample, with its
   /// velocities. Nothing where it is out of reach.
@@ -59,9 +62,9 @@ class Step {
     PointMotion from;
     from.position = across - ahead;
     swing.Begin(from, Eigen::Matrix3d::Identity(), across + ahead,
-                Eigen::AngleAxisd(turn, Vector3d::UnitZ()).toRotationMatrix(), 0, spec_.swing,
-                spec_.foot);
-    const double com_height = height_ - spec_.com_lowering;
+                Eigen::AngleAxisd(turn, Vector3d::UnitZ()).toRotationMatrix(), 0, single(),
+                spec_.swing);
+    const double com_height = height_ - spec_.walk_lowering;
     const double omega = std::sqrt(robot::kGravity / com_height);
     const Orbit sagittal(omega, single(), both(), 0.5 * length, false);
     const Orbit lateral(omega, single(), both(), 0.5 * spacing_, true);
@@ -69,7 +72,7 @@ class Step {
     robot::PostureGoal goal;
     goal.nominal = nominal_;
     for (int i = 0; i <= kSamples; ++i) {
-      const double time = std::min(i * interval(), spec_.swing);
+      const double time = i * interval();
       const double middle = i * interval() - 0.5 * single();
       Eigen::Isometry3d& foot = goal.foot[Other(stance)];
       foot.translation() = swing.At(time).position;
@@ -123,7 +126,7 @@ class Step {
  private:
   const robot::RobotModel& model_;
   double height_;
-  stepping::WalkSpec spec_;
+  stepping::RecoverySpec spec_;
   double spacing_;
   VectorXd nominal_;
 };

@@ -18,7 +18,7 @@ struct StepLoads {
 /// m/s and rad/s, of the scenario `walk`: the step that is looked at walks and turns like that.
 inline constexpr double kCheckedSpeed = 0.1, kCheckedTurn = 0.1;
 
-/// One step of either foot of a steady walk, with the robot's own defaults of step_planner.walk:
+/// One step of either foot of a steady walk, as step_planner.walk makes them:
 /// the COM as a linear inverted pendulum above the stance sole's origin, the swing foot as
 /// stepping::Swing moves it. `standing`: N·m that holds each joint on both feet (HoldingTorque).
 /// Nothing where a posture is out of the legs' reach. Throws ConfigError: legs that the walk

@@ -15,8 +15,6 @@ class KnownGround {
   bool empty() const { return edge_.empty(); }
   /// m, under the middle of `foot` at x, m; 0 before the first edge.
   double At(Foot foot, double x) const;
-  /// Between x = `rear` and `front`, m, an edge lies under `foot`.
-  bool EdgeWithin(Foot foot, double rear, double front) const;
 
  private:
   struct Edge {

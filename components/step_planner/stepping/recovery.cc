@@ -14,9 +14,9 @@ using Eigen::Vector3d;
 // m beyond the soles from which on neither ankles nor hips are trusted to bring the capture point
 // back. Fitted to what stands from both feet (docs/reference/steps.md).
 constexpr double kHopelessExcess = 0.015;
-// A capture point this far beyond the soles, m, steps as soon as the best step would leave it less
-// than kLateMargin, m, inside the new ones: noise makes no step, and waiting none that comes late.
-constexpr double kLeastExcess = 0.02, kLateMargin = 0.03;
+// m inside the new soles that the best step must leave the capture point: waiting longer would
+// make it come late.
+constexpr double kLateMargin = 0.03;
 constexpr double kAgainAfter = 0.03;   // s beyond the soles of a step: longer than its touch
 constexpr double kNearEdgeTime = 0.1;  // s near the soles' edge: a push that stands is out sooner
 constexpr int kMostSteps = 12;         // in a row: an end to steps that catch nothing
@@ -27,9 +27,9 @@ constexpr double kStepOnShare = 0.5;
 // leg and the turning body give to the COM and take from it then moves no foothold.
 constexpr double kMomentumShare = 0.5;
 // 1/s, critically damped: the return of a turned body to upright, for which the COM's reference
-// leaves room within the soles, m of centre of pressure at most, while a foot swings and on both.
+// leaves room within the soles, while both carry at most so many m of centre of pressure.
 constexpr double kLeanRate = 6;
-constexpr double kSwingBudget = 0.02, kCatchBudget = 0.1;
+constexpr double kCatchBudget = 0.1;
 // The robot rests once the capture point is within so many m of the soles' middle and the COM
 // slower than so many m/s for so many s: a swing of the COM is longer.
 constexpr double kStillDistance = 0.03, kStillSpeed = 0.06, kStillTime = 0.3;
@@ -44,14 +44,6 @@ constexpr double kTogetherShift = 1.5, kMostShifts = 2.5;
 constexpr double kTogetherRamp = 0.2, kTogetherSwing = 0.7;
 constexpr double kTogetherGain = 1;
 constexpr double kTogetherDistance = 0.03;  // m from side by side that is side by side
-// s in which a walk that begins brings the capture point to where its first step starts.
-constexpr double kSetOff = 0.5;
-// Share of the standing height by which the COM walks lower, so that knees can give. Fitted: with
-// none iCub and heron fall as they step in place, with 0.09 iCub does.
-constexpr double kWalkLowering = 0.06;
-// m by which a walk's foothold may miss its place before a recovery's step is looked for.
-constexpr double kMostMissed = 0.05;
-constexpr double kTurnShare = 0.5;  // of the way between the soles' headings that the body takes
 // Time constant, as a share of the settling, with which a foot that touches is let go.
 constexpr double kLetGo = 0.25;
 
@@ -218,29 +210,6 @@ bool Recovery::TogetherNow(const StepInput& input, const StepState& state, StepP
   return plan->possible;
 }
 
-Gait Recovery::gait(const StepState& state) const {
-  return {command_, spec_.stride / state.pendulum.frequency, 0.5 * spec_.load, spec_.gain};
-}
-
-StepPlan Recovery::WalkOn(const StepState& state, Foot foot, double unload,
-                          StepReason* reason) const {
-  StepPlan plan = choice_.Stride(state, foot, gait(state), unload);
-  *reason = StepReason::kWalk;
-  if (std::isfinite(plan.margin) && plan.missed < kMostMissed) return plan;
-  const StepPlan caught = choice_.Next(state, foot);
-  if (!caught.possible || !(caught.margin > plan.margin)) return plan;
-  *reason = StepReason::kAgain;
-  return caught;
-}
-
-Vector2d Recovery::WalkingPoint(const StepInput& input, const StepState& state, Foot stance,
-                                const balance::ConvexPolygon& support, double left) const {
-  const Vector2d body = ForBody(input, kSwingBudget);
-  StepState with = state;
-  with.pendulum.com += body / (1 + spec_.gain);
-  return choice_.StridePoint(with, stance, gait(state), left, support) - body;
-}
-
 void Recovery::BeginShift(const StepInput& input, const StepState& state) {
   if (num_steps_ == 0) standing_height_ = input.com_height - input.sole[0].translation().z();
   height_.Begin(input.com_height);
@@ -252,47 +221,9 @@ void Recovery::BeginShift(const StepInput& input, const StepState& state) {
   stage_ = Stage::kShifting;
 }
 
-void Recovery::SetOff(const StepInput& input, const StepState& state) {
-  // The foot of the side that it goes to is the first.
-  const double out = command_.velocity.y() != 0 ? command_.velocity.y() : command_.turn_rate;
-  plan_ = StepPlan();
-  plan_.foot = out > 0 ? Foot::kLeft : Foot::kRight;
-  reason_ = StepReason::kWalk;
-  BeginShift(input, state);
-  BeginTurning(state);
-}
-
-void Recovery::BeginTurning(const StepState& state) {
-  if (turns_) return;
-  turns_ = true;
-  start_yaw_ = state.yaw;
-  body_yaw_.Begin(0);
-}
-
-void Recovery::TurnBody(const StepState& state, double period) {
-  if (!turns_) return;
-  const bool steps = stage_ == Stage::kUnloading || stage_ == Stage::kSwinging;
-  const Foot s = Other(plan_.foot);
-  const double other = steps ? plan_.yaw : state.sole_yaw[plan_.foot];
-  const double heading =
-      state.sole_yaw[s] + kTurnShare * std::remainder(other - state.sole_yaw[s], 2 * M_PI);
-  const double yaw = body_yaw_.point().position;
-  body_yaw_.Follow(yaw + std::remainder(heading - start_yaw_ - yaw, 2 * M_PI), period);
-}
-
 void Recovery::Shift(const StepInput& input, const StepState& state, double excess) {
   if (reason_ == StepReason::kWalk) {
-    if (excess > kLeastExcess) {
-      BeginStep(input, choice_.Choose(state), StepReason::kSure);
-    } else if (!command_.stepping) {
-      stage_ = Stage::kCatching;
-      since_ = moving_since_ = input.time;
-      cop_from_ = output_.cop;
-    } else if (input.time >= since_ + kSetOff - kTimeTolerance) {
-      StepReason reason = StepReason::kWalk;
-      const StepPlan plan = WalkOn(state, plan_.foot, choice_.limits().unload, &reason);
-      BeginStep(input, plan, reason);
-    }
+    ShiftToStride(input, state, excess);
     return;
   }
   const Foot stance = Other(plan_.foot);
@@ -378,6 +309,7 @@ void Recovery::Settle(const StepInput& input) {
 
 void Recovery::Land(const StepInput& input) {
   in_contact_[plan_.foot] = true;
+  CountStride(input);
   stage_ = Stage::kLoading;
   since_ = input.time;
   cop_from_ = output_.cop;
@@ -529,7 +461,7 @@ bool Recovery::AtRest(const StepInput& input, const StepState& state) {
 
 double Recovery::LoweringShare(const StepState& state) const {
   double share = 0;
-  if (command_.stepping) share = kWalkLowering * standing_height_ / choice_.reach().lowering();
+  if (command_.stepping) share = spec_.walk_lowering / choice_.reach().lowering();
   // A walk keeps its height: a COM that comes down with each step brings its foot down too soon.
   if (!command_.stepping || reason_ != StepReason::kWalk) {
     const Eigen::Matrix2d turn = Eigen::Rotation2Dd(-state.yaw).toRotationMatrix();
@@ -588,8 +520,8 @@ void Recovery::LeadCom(const StepInput& input, const StepState& state) {
 void Recovery::Archive(StateArchive* archive) {
   archive->Show(stage_, reason_, num_steps_, steps_now_, in_contact_);
   archive->Show(plan_.possible, plan_.foot, plan_.time, plan_.foothold, plan_.yaw, plan_.cop,
-                plan_.capture_point, plan_.com, plan_.margin, plan_.missed, plan_.place,
-                plan_.around, plan_.corner);
+                plan_.capture_point, plan_.com, plan_.margin, plan_.missed, plan_.moved,
+                plan_.place, plan_.around, plan_.corner);
   swing_.Archive(archive);
   height_.Archive(archive);
   outside_.Archive(archive);
@@ -599,6 +531,7 @@ void Recovery::Archive(StateArchive* archive) {
                 together_asked_, together_at_, shift_from_, step_helps_);
   archive->Show(command_.velocity, command_.turn_rate, command_.stepping, start_yaw_, turns_);
   body_yaw_.Archive(archive);
+  stride_.Archive(archive);
   output_.Archive(archive);
 }
 

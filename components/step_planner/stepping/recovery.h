@@ -8,6 +8,7 @@
 #include "components/framework/state_archive.h"
 #include "components/step_planner/stepping/footwork.h"
 #include "components/step_planner/stepping/step_choice.h"
+#include "components/step_planner/stepping/stride_correction.h"
 #include "components/step_planner/stepping/swing.h"
 
 namespace poise::stepping {
@@ -31,6 +32,7 @@ struct RecoverySpec {
   double watched_margin = -1;
   double together_after = 0;  ///< s at rest until the feet are put side by side; 0: when asked
   double stride = 0;          ///< of a walk's step, its time times ω
+  double walk_lowering = 0;   ///< m by which the COM walks lower than it stands
   double acceleration = 0, turn_acceleration = 0;  ///< m/s², rad/s², of what is walked
   double yaw_rate = 0;  ///< 1/s, with which the body's heading follows the feet's
 };
@@ -108,6 +110,7 @@ class Recovery {
   Eigen::Vector2d BrakingPoint(const StepInput& input, const StepState& state) const;
   Eigen::Vector2d CatchingPoint(const StepInput& input, const StepState& state) const;
   Eigen::Vector2d Goal(const StepState& state) const;
+  /// Of the command, corrected by what the last strides came to.
   Gait gait(const StepState& state) const;
   /// The step of a walk, or of a recovery where the walk's misses its place.
   StepPlan WalkOn(const StepState& state, Foot foot, double unload, StepReason* reason) const;
@@ -119,6 +122,11 @@ class Recovery {
   void BeginShift(const StepInput& input, const StepState& state);
   /// From rest: the capture point goes to where the first step begins.
   void SetOff(const StepInput& input, const StepState& state);
+  /// From rest: the capture point on its way there; then the first step, or one that a push asks
+  /// for.
+  void ShiftToStride(const StepInput& input, const StepState& state, double excess);
+  /// A foot has landed.
+  void CountStride(const StepInput& input);
   /// The body's heading follows the feet's from now on.
   void BeginTurning(const StepState& state);
   void TurnBody(const StepState& state, double period);
@@ -137,6 +145,14 @@ class Recovery {
   void Hurry(const StepState& state, double time);
   void LeadCom(const StepInput& input, const StepState& state);
   double LoweringShare(const StepState& state) const;
+
+  // s in which a walk that begins brings the capture point to where its first step starts.
+  static constexpr double kSetOff = 0.5;
+  // Capture points this far beyond the soles, m, step as soon as the best step would leave less
+  // than kLateMargin (recovery.cc), m, inside the new ones: noise makes no step.
+  static constexpr double kLeastExcess = 0.02;
+  // m of centre of pressure, at most, for the return of the body to upright while a foot swings.
+  static constexpr double kSwingBudget = 0.02;
 
   StepChoice choice_;
   RecoverySpec spec_;
@@ -163,6 +179,7 @@ class Recovery {
   double standing_height_ = 0;  // m, above the soles, before the first step
   HeightLead height_;           // m, world, of the COM's reference
   WalkCommand command_;
+  StrideCorrection stride_;
   HeightLead body_yaw_;   // rad, since it stood
   double start_yaw_ = 0;  // rad
   bool turns_ = false;

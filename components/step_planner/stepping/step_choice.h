@@ -53,6 +53,7 @@ struct StepPlan {
   /// m, of the COM at touch-down inside the stance leg's reach; negative: the leg cannot follow.
   double follows = 0;
   double missed = 0;  ///< m from where the foot was wanted to the foothold
+  double moved = 0;   ///< m from the foothold of the undisturbed gait; of a walk's step
   Place place = Place::kBeside;
   bool around = false;  ///< the way goes around the stance leg, by `corner`, m
   Eigen::Vector2d corner = Eigen::Vector2d::Zero();

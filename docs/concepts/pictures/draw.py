@@ -413,46 +413,31 @@ def steps():
 
 
 def walking():
-    p = Picture("walking", "Capture point and centre of pressure from foot to foot, computed backwards", 640, 290)
-    single, ramp = 0.61, 0.4  # s: swing + settle, load + unload
-    pieces, side, place = [], 1, 0.0
-    for _ in range(4):
-        nxt = side * SOLE_Y
-        pieces += [(place, nxt, ramp), (nxt, nxt, single)]
-        place, side = nxt, -side
-    pieces.append((place, 0.0, ramp))
-    end, planned = 0.0, []
-    for start, stop, duration in reversed(pieces):  # CapturePlan::Finish
-        slope = (stop - start) / duration
-
-        def at(t, start=start, stop=stop, duration=duration, slope=slope, end=end):
-            return start + slope * t + slope / OMEGA + (end - stop - slope / OMEGA) * math.exp(-OMEGA * (duration - t))
-
-        planned.append((start, slope, duration, at))
-        end = at(0)
-    axes = Axes(p, 60, 30, 560, 205, (0, 4.5), (-0.2, 0.2))
+    p = Picture("walking", "Capture point and centre of pressure from foot to foot, as strides ask for it", 640, 290)
+    time, gain, steps, dt = 1.3 / OMEGA, 0.4, 7, 0.005  # s, the recovery's gain
+    growth = math.exp(OMEGA * time)
+    axes = Axes(p, 60, 30, 560, 205, (0, 3.6), (-0.2, 0.2))
     for middle in (-SOLE_Y, SOLE_Y):
-        top, bottom = axes.at(0, middle + HALF_WIDTH), axes.at(4.5, middle - HALF_WIDTH)
+        top, bottom = axes.at(0, middle + HALF_WIDTH), axes.at(3.6, middle - HALF_WIDTH)
         p.box(top[0], top[1], bottom[0] - top[0], bottom[1] - top[1], "ff")
-    clock, xi_course, cop_course, com_course, com = 0.0, [], [], [], None
-    for start, slope, duration, at in reversed(planned):
-        count = 21
-        for i in range(count):
-            t = duration * i / (count - 1)
-            xi_course.append((clock + t, at(t)))
-            cop_course.append((clock + t, start + slope * t))
-            com = at(t) if com is None else com
-            com_course.append((clock + t, com))
-            if i < count - 1:
-                com += (at(t) - com) * (1 - math.exp(-OMEGA * duration / (count - 1)))
-        clock += duration
-    axes.curve(cop_course, "b d")
-    axes.curve(xi_course, "a")
-    axes.curve(com_course, "l")
+    # NominalStride on the spot: footsteps of 2 SOLE_Y to one side, then to the other.
+    side, course, clock = -1, [], 0.0
+    xi = com = -SOLE_Y + 2 * SOLE_Y * (growth - 1) / (growth ** 2 - 1)
+    while clock < 3.6:
+        walks = clock < steps * time
+        side = -1 if int(clock / time) % 2 == 0 else 1
+        cop = side * SOLE_Y if walks else xi + gain * xi
+        course.append((clock, xi, cop, com))
+        xi += dt * OMEGA * (xi - cop)
+        com += dt * OMEGA * (xi - com)
+        clock += dt
+    axes.curve([(t, cop) for t, _, cop, _ in course], "b d")
+    axes.curve([(t, xi) for t, xi, _, _ in course], "a")
+    axes.curve([(t, com) for t, _, _, com in course], "l")
     axes.label(0, 0.18, "left sole", "s", dx=6, dy=14)
     axes.label(0, -0.18, "right sole", "s", dx=6, dy=-2)
-    axes.label(4.5, 0.2, "ξ (full)   p (dashed)   COM (thin)", "s", "end", dy=-8)
-    axes.ticks([0, 1, 2, 3, 4], [-0.105, 0, 0.105], "time, s", "to the left, m")
+    axes.label(3.6, 0.2, "ξ (full)   p (dashed)   COM (thin)", "s", "end", dy=-8)
+    axes.ticks([0, 1, 2, 3], [-0.105, 0, 0.105], "time, s", "to the left, m")
     return p
 
 

@@ -1,5 +1,5 @@
-// What a walk is made of: footsteps, the capture point between them, other places, edges that are
-// told of, and how far a pressed sole has sunk.
+// What a walk is made of: footsteps, the capture point of strides, edges that are told of, and how
+// far a pressed sole has sunk.
 #include "components/step_planner/stepping/footsteps.h"
 
 #include <gtest/gtest.h>
@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "components/balance/minimum_jerk.h"
-#include "components/step_planner/stepping/capture_plan.h"
 #include "components/step_planner/stepping/pressed_sole.h"
-#include "components/step_planner/stepping/walk.h"
+#include "components/step_planner/stepping/quasi_static_walk.h"
+#include "components/step_planner/stepping/stride_correction.h"
 #include "tests/robot/robot_test_support.h"
 
 namespace poise::stepping {
@@ -22,44 +22,6 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using robot::TestRobot;
-
-CapturePlan ThreePieces(double w) {
-  CapturePlan plan;
-  plan.Append({0, 0.1}, {0.02, -0.1}, 0.4);
-  plan.Append({0.02, -0.1}, {0.02, -0.1}, 0.6);
-  plan.Append({0.02, -0.1}, {0.15, 0.1}, 0.5);
-  plan.Finish(w, {0.2, 0.08});
-  return plan;
-}
-
-TEST(CapturePlan, ObeysItsDifferentialEquation) {
-  const double w = 3.5, h = 1e-4;
-  const CapturePlan plan = ThreePieces(w);
-  // Forward by Runge and Kutta from where the plan begins: it ends where it was told to.
-  Vector2d point = plan.At(0).capture_point;
-  const auto rate = [&](double t, const Vector2d& x) -> Vector2d {
-    return w * (x - plan.At(t).cop);
-  };
-  for (int i = 0; i < 15000; ++i) {
-    const double t = i * h;
-    EXPECT_NEAR((point - plan.At(t).capture_point).norm(), 0, 1e-6) << t;
-    const Vector2d k1 = rate(t, point), k2 = rate(t + 0.5 * h, point + 0.5 * h * k1);
-    const Vector2d k3 = rate(t + 0.5 * h, point + 0.5 * h * k2), k4 = rate(t + h, point + h * k3);
-    point += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
-  }
-  EXPECT_NEAR((point - Vector2d(0.2, 0.08)).norm(), 0, 1e-6);
-}
-
-TEST(CapturePlan, IsClosedFormOnOneFootAndHeldAtItsEnds) {
-  const double w = 3.5;
-  CapturePlan plan;
-  const Vector2d foot(0.1, -0.1), end(0.15, -0.02);
-  plan.Append(foot, foot, 0.6);
-  plan.Finish(w, end);
-  EXPECT_LT((plan.At(0).capture_point - (foot + std::exp(-w * 0.6) * (end - foot))).norm(), 1e-12);
-  EXPECT_LT((plan.At(9).capture_point - end).norm(), 1e-12);
-  EXPECT_LT((plan.At(-1).capture_point - plan.At(0).capture_point).norm(), 1e-12);
-}
 
 FootstepLimits Limits() { return {0.21, 0.17, 0.3, 0.15, 0.4}; }
 
@@ -173,7 +135,7 @@ TEST(Footsteps, AWayThatIsFarIsComeBackToByStepsThatDoNotCross) {
   EXPECT_NEAR(moved.yaw, 0.03, 1e-12);
 }
 
-TEST(Walk, TheRampBeginsWhereItCarriesWhatThePressDoes) {
+TEST(QuasiStaticWalk, TheRampBeginsWhereItCarriesWhatThePressDoes) {
   for (const double share : {0.0, 0.1, 0.4}) {
     EXPECT_NEAR(balance::SmoothStep(RampStart(share)), share, 1e-9);
   }
@@ -192,6 +154,52 @@ TEST(Footsteps, ACommandIsApproachedWithoutHaste) {
   EXPECT_TRUE(now.stepping);
   for (int i = 0; i < 4; ++i) now = Approach(now, {}, 0.1, 1);
   EXPECT_FALSE(now.stepping);
+}
+
+/// A robot whose steps come to `share` of what it is told, ahead, aside and in a turn, for `steps`
+/// of 0.4 s, from a heading of 2 rad on. Every second step alone goes aside and turns.
+void WalkShort(const Vector3d& share, const WalkCommand& command, int steps,
+               StrideCorrection* correction) {
+  const double period = 0.4;
+  Vector2d middle(3, -1);
+  double heading = 2;
+  for (int i = 0; i < steps; ++i) {
+    const WalkCommand told = correction->Corrected(command);
+    const double out = i % 2 == 0 ? 2 * period : 0;
+    const double turn = share.z() * out * told.turn_rate;
+    const Vector2d way(share.x() * period * told.velocity.x(), share.y() * out * told.velocity.y());
+    middle += Eigen::Rotation2Dd(heading + 0.5 * turn) * way;
+    heading += turn;
+    correction->Land(i * period, middle, std::remainder(heading, 2 * std::numbers::pi), command);
+  }
+}
+
+TEST(StrideCorrection, MakesUpForWhatStepsFallShortOf) {
+  const Vector3d share(0.85, 0.95, 0.8);
+  StrideCorrection correction;
+  WalkShort(share, {{0.5, -0.1}, 0.3, true}, 40, &correction);
+  // A turn rounds the way off by the chord of a step.
+  EXPECT_LT((correction.factor() - share.cwiseInverse()).norm(), 0.01)
+      << correction.factor().transpose();
+}
+
+TEST(StrideCorrection, LeavesWhatIsAsCommandedOrNotKnown) {
+  for (const Vector3d& share : {Vector3d(1, 1, 1), Vector3d(0.5, 0.5, 0.5)}) {
+    StrideCorrection correction;
+    if (share == Vector3d::Ones()) WalkShort(share, {{0.5, 0}, 0, true}, 20, &correction);
+    WalkShort(share, {{0, 0}, 0, true}, 20, &correction);  // nothing is asked for
+    for (int i = 0; i < 20; ++i) {                         // never two of one command
+      correction.Forget();
+      WalkShort(share, {{0.5 + 0.01 * i, 0}, 0.3, true}, 2, &correction);
+    }
+    EXPECT_LT((correction.factor() - Vector3d::Ones()).norm(), 1e-12);
+  }
+}
+
+TEST(StrideCorrection, StaysWithinBounds) {
+  StrideCorrection correction;
+  WalkShort({0, 3, 0}, {{0.5, 0.1}, 0.3, true}, 100, &correction);
+  EXPECT_LT((correction.factor() - Vector3d(1.4, 0.9, 1.4)).norm(), 1e-12);
 }
 
 TEST(PressedSole, SinksByItsSpringAndNotByLyingDown) {
@@ -238,9 +246,6 @@ TEST(KnownGround, IsTheLastEdgeThatWasPassedInThisFootsLane) {
   EXPECT_EQ(ground.At(Foot::kRight, 0.7), 0);
   EXPECT_EQ(ground.At(Foot::kRight, 5), 0.2);
   EXPECT_EQ(ground.At(Foot::kLeft, 1.2), 0.3);
-  EXPECT_TRUE(ground.EdgeWithin(Foot::kLeft, 0.5, 0.7));
-  EXPECT_FALSE(ground.EdgeWithin(Foot::kRight, 0.5, 0.7));
-  EXPECT_FALSE(ground.EdgeWithin(Foot::kLeft, 0.6, 1.0));
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "components/robot/posture.h"
-#include "components/step_planner/stepping/walk.h"
+#include "components/step_planner/stepping/quasi_static_walk.h"
 #include "components/step_planner/walk_config.h"
 #include "tests/robot/robot_test_support.h"
 
@@ -26,29 +26,18 @@ inline constexpr double kPeriod = 0.002;  // s
 inline constexpr double kWeight = 500;    // N
 inline constexpr double kDownLoad = 200;  // N of a foot that is down
 
-/// A walk that waits above the stance sole and presses the other one down.
-inline WalkConfig QuasiStatic() {
-  WalkConfig config;
-  config.set_quasi_static(true);
-  config.set_press(0.1);
-  return config;
-}
-
 class World {
  public:
-  /// The shipped walk, but for what is given. `rough`: m, by how much the ground is lower under
-  /// every third foothold. `patient`: s more for each ramp of the load.
-  explicit World(TestRobot robot, double rough = 0, double patient = 0,
-                 const WalkConfig& config = {})
+  /// The quasi-static walk as it ships. `rough`: m, by how much the ground is lower under every
+  /// third foothold.
+  explicit World(TestRobot robot, double rough = 0)
       : model_(robot::LoadTestRobot(robot)), rough_(rough) {
     const double height = robot::StandingHeight(model_);
-    const StepChoice choice = MakeWalkChoice(config, model_);
-    spec_ = MakeWalkSpec(config, ContactConfirmation(), model_, choice);
-    spec_.load += patient;
-    spec_.unload += patient;
+    const StepChoice choice = MakeWalkChoice(WalkConfig(), model_);
+    spec_ = MakeQuasiStaticSpec(WalkConfig(), ContactConfirmation(), model_, choice);
     spec_.weight = kWeight;
-    if (config.press() > 0) spec_.press_load = kDownLoad;
-    walk_ = Walk(choice, spec_);
+    spec_.press_load = kDownLoad;
+    walk_ = QuasiStaticWalk(choice, spec_);
     const StepLimits& limits = choice.limits();
     sole_margin_ = limits.sole_margin;
     com_ = {0, 0, height};
@@ -62,8 +51,6 @@ class World {
   void Soften(double depth) { soft_ = depth; }
   /// No ground under a sole whose centre is from `from` to `to`, m, along x.
   void Dig(double from, double to) { hole_ = {from, to}; }
-  /// Ground that turns each foot outwards by so much, rad, as it comes down.
-  void Twist(double yaw) { twist_ = yaw; }
   bool Lost(const Vector2d& push) const {
     StepInput input = See();
     input.com_velocity.head<2>() += push;
@@ -72,7 +59,7 @@ class World {
 
   /// From the next tick on each tick is a fresh object's, which has but the archive of the last
   /// one.
-  void Hand(const Walk& fresh) { fresh_ = fresh; }
+  void Hand(const QuasiStaticWalk& fresh) { fresh_ = fresh; }
   void Push(const Vector2d& velocity) { velocity_.head<2>() += velocity; }
 
   void Run(double duration, const WalkCommand& command) {
@@ -93,8 +80,8 @@ class World {
     return walk_.stage() == stage;
   }
 
-  Walk& walk() { return walk_; }
-  const WalkSpec& spec() const { return spec_; }
+  QuasiStaticWalk& walk() { return walk_; }
+  const QuasiStaticSpec& spec() const { return spec_; }
   const std::array<Eigen::Isometry3d, 2>& sole() const { return sole_; }
   Vector2d middle() const {
     return 0.5 * (sole_[0].translation() + sole_[1].translation()).head<2>();
@@ -173,10 +160,6 @@ class World {
       const double ground = Ground(sole_[i]) - (pressed ? soft_ : 0);
       if (pressed || output.swing.velocity.z() < 0) z = std::max(z, ground);
       if (pressed && soft_ > 0) z = ground;
-      if (pressed && twist_ != 0) {
-        sole_[i].linear() =
-            Eigen::AngleAxisd(i == 0 ? -twist_ : twist_, Vector3d::UnitZ()).toRotationMatrix();
-      }
     }
     EXPECT_GE(balance::SignedDistance(soles, output.cop), 0.5 * sole_margin_) << time_;
     const Vector3d& acceleration = output.com.acceleration;
@@ -191,10 +174,10 @@ class World {
   robot::RobotModel model_;
   double rough_, soft_ = 0;
   std::array<double, 2> hole_{0, 0};
-  double twist_ = 0, sole_margin_ = 0;
-  WalkSpec spec_;
-  Walk walk_;
-  std::optional<Walk> fresh_;
+  double sole_margin_ = 0;
+  QuasiStaticSpec spec_;
+  QuasiStaticWalk walk_;
+  std::optional<QuasiStaticWalk> fresh_;
   double time_ = 0;
   Vector3d com_, velocity_ = Vector3d::Zero();
   std::array<Eigen::Isometry3d, 2> sole_;

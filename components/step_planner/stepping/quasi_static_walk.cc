@@ -1,7 +1,8 @@
-#include "components/step_planner/stepping/walk.h"
+#include "components/step_planner/stepping/quasi_static_walk.h"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "components/balance/minimum_jerk.h"
 
@@ -11,8 +12,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kRiseOver = 0.5;   // share of a swing before which no load is a landing
-constexpr double kTogether = 0.03;  // m, rad: the feet stand side by side
+constexpr double kRiseOver = 0.5;  // share of a swing before which no load is a landing
 // Time constant, as a share of the settling, with which a foot that touches is let go; of at most
 // so many s of it.
 constexpr double kLetGo = 0.25, kLongestLetGo = 0.06;
@@ -27,26 +27,25 @@ constexpr double kPressed = 0.8;
 // pressure is, and comes up with it. A foot that carries nothing and is a contact of the model
 // still was dragged off its place.
 constexpr double kSlowestUnload = 0.1, kFastestUnload = 3;
-constexpr double kStopTime = 0.1;  // s in which a capture point that must wait is stopped
 // Share of a straight leg, to which it is stretched at most. Fitted: 0.9 and 0.94 fall as seldom,
 // 0.97 and 0.86 more often; with 0.97 the knee of a foot that is about to leave the ground came to
 // be straight.
 constexpr double kStretched = 0.92;
-constexpr int kMostClosing = 3;  // steps that bring the feet side by side, until it stands as it is
-constexpr double kBlend = 0.1;   // s in which the centre of pressure goes over to another stage's
+// 1/s with which is observed what legs and body add to the pendulum. A sole on 20 kN/m rolls at
+// some 4 Hz, and a faster observer stirs it: with 10 it grew to 30 degrees.
+constexpr double kOffsetRate = 5;
+// Ratio: how much longer a swing lasts at most above a sole that has sunk. One on 2 kN/m takes a
+// centre of pressure 35 mm off its middle along it, and 10 mm across.
+constexpr double kSlowestSwing = 2.5;
+constexpr double kBlend = 0.1;  // s in which the centre of pressure goes over to another stage's
 
 double Difference(double yaw, double from) { return std::remainder(yaw - from, 2 * M_PI); }
 
-WalkSpec Pressing(WalkSpec spec) {
-  spec.press_load = std::max(spec.press_load, spec.touch_load);
-  return spec;
-}
-
 }  // namespace
 
-Walk::Walk(const StepChoice& choice, const WalkSpec& spec)
+QuasiStaticWalk::QuasiStaticWalk(const StepChoice& choice, const QuasiStaticSpec& spec)
     : choice_(choice),
-      spec_(Pressing(spec)),
+      spec_(spec),
       height_(spec.height_rate),
       body_yaw_(spec.yaw_rate),
       pressed_(spec.height_rate),
@@ -62,45 +61,31 @@ double RampStart(double share) {
   return low;
 }
 
-void Walk::Enter(WalkStage stage, double time) {
+void QuasiStaticWalk::Enter(WalkStage stage, double time) {
   if (stage == WalkStage::kUnloading) unloaded_ = 0;
   stage_ = stage;
   since_ = time;
 }
 
-Footstep Walk::Standing(const StepState& state, Foot foot) const {
-  return {state.sole[foot], state.sole_yaw[foot]};
-}
-
-Footstep Walk::Next(const Footstep& stance, Foot foot) const {
+Footstep QuasiStaticWalk::Next(const Footstep& stance, Foot foot) const {
   return NextFootstep(stance, foot, command_, spec_.period(), spec_.step);
 }
 
-Footstep Walk::NextOnCourse(const Footstep& stance, Foot foot) const {
-  // At the end the feet come side by side, wherever that is.
-  const double most = closing_ ? 0 : spec_.most_return;
-  return Towards(Next(stance, foot), Next(course_, foot), most, stance, foot, spec_.step);
+Footstep QuasiStaticWalk::NextOnCourse(const Footstep& stance, Foot foot) const {
+  return Towards(Next(stance, foot), Next(course_, foot), spec_.most_return, stance, foot,
+                 spec_.step);
 }
 
-bool Walk::LiftsOff(const StepState& state, double time) const {
+bool QuasiStaticWalk::LiftsOff(const StepState& state, double time) const {
   if (time < since_ + slower_ * spec_.unload - kTimeTolerance) return false;
-  if (spec_.quasi_static && unloaded_ < 1) return false;
+  if (unloaded_ < 1) return false;
   const Vector2d off = state.pendulum.capture_point() - state.sole[stance_];
-  return !spec_.quasi_static || off.norm() < spec_.lift_off_distance;
+  return off.norm() < spec_.lift_off_distance;
 }
 
-bool Walk::FeetTogether(const StepState& state) const {
-  const double yaw = state.sole_yaw[stance_];
-  const Vector2d between = Eigen::Rotation2Dd(-yaw) * (state.sole[1] - state.sole[0]);
-  return std::abs(between.x()) < kTogether &&
-         std::abs(Difference(state.sole_yaw[1], state.sole_yaw[0])) < kTogether;
-}
+bool QuasiStaticWalk::OnSoftGround() const { return std::max(sinks_[0], sinks_[1]) > spec_.soft; }
 
-bool Walk::OnSoftGround() const {
-  return spec_.quasi_static && std::max(sinks_[0], sinks_[1]) > spec_.soft;
-}
-
-bool Walk::AtRest(const StepInput& input, const StepState& state) {
+bool QuasiStaticWalk::AtRest(const StepInput& input, const StepState& state) {
   const Vector2d middle = 0.5 * (state.sole[0] + state.sole[1]);
   const bool still = (state.pendulum.capture_point() - middle).norm() < spec_.still_distance &&
                      input.com_velocity.norm() < spec_.still_speed;
@@ -108,7 +93,7 @@ bool Walk::AtRest(const StepInput& input, const StepState& state) {
   return input.time >= moving_since_ + spec_.still_time - kTimeTolerance;
 }
 
-bool Walk::Update(const StepInput& input, const WalkCommand& command) {
+bool QuasiStaticWalk::Update(const StepInput& input, const WalkCommand& command) {
   const double time = input.time;
   StepState state = Observe(input, active() ? in_contact_ : input.in_contact);
   switch (stage_) {
@@ -150,19 +135,17 @@ bool Walk::Update(const StepInput& input, const WalkCommand& command) {
       return false;
   }
   state.in_contact = in_contact_;
-  PlanFrom(state);
-  if (stage_ == WalkStage::kSwinging && !spec_.quasi_static) Adjust(input, state);
   Lead(input, state);
   time_ = time;
   return true;
 }
 
-void Walk::Start(const StepInput& input, const StepState& state, const WalkCommand& command) {
+void QuasiStaticWalk::Start(const StepInput& input, const StepState& state,
+                            const WalkCommand& command) {
   command_ = Approach({}, command, spec_.acceleration * spec_.period(),
                       spec_.turn_acceleration * spec_.period());
   starting_ = true;
-  closing_ = final_ = false;
-  closings_ = 0;
+  final_ = false;
   // The foot on the side that it goes or turns to steps first.
   const double side = command.velocity.y() != 0 ? command.velocity.y() : command.turn_rate;
   stance_ = side > 0 ? Foot::kRight : Foot::kLeft;
@@ -177,27 +160,21 @@ void Walk::Start(const StepInput& input, const StepState& state, const WalkComma
   height_.Begin(input.com_height);
   start_yaw_ = state.yaw;
   body_yaw_.Begin(0);
-  course_ = Standing(state, stance_);
+  course_ = {state.sole[stance_], state.sole_yaw[stance_]};
   foothold_ = Next(course_, Other(stance_));
   left_over_.setZero();
   offset_.setZero();
   reckoned_ = state.pendulum.capture_point();
   Enter(WalkStage::kStarting, input.time);
-  // From rest to the capture point and its velocity at lift-off; the centre of pressure is
-  // ξ − ξ̇/ω, above the stance foot then.
-  PlanFrom(state);
-  const Vector2d above = state.sole[stance_];
-  const CapturePlan::Point lift_off =
-      spec_.quasi_static ? CapturePlan::Point{above, above} : plan_.At(0);
-  const Vector2d now = state.pendulum.capture_point();
-  const Vector2d speed = state.pendulum.frequency * (lift_off.capture_point - lift_off.cop);
+  // From rest to rest above the stance sole.
+  const Vector2d now = state.pendulum.capture_point(), above = state.sole[stance_];
   for (int i = 0; i < 2; ++i) {
-    start_[static_cast<size_t>(i)].Begin({now[i]}, {lift_off.capture_point[i], speed[i], 0},
-                                         input.time, spec_.start + spec_.unload);
+    start_[static_cast<size_t>(i)].Begin({now[i]}, {above[i], 0, 0}, input.time,
+                                         spec_.start + spec_.unload);
   }
 }
 
-void Walk::BeginSwing(const StepInput& input) {
+void QuasiStaticWalk::BeginSwing(const StepInput& input) {
   const Foot foot = Other(stance_);
   in_contact_[foot] = false;
   starting_ = false;
@@ -218,12 +195,12 @@ void Walk::BeginSwing(const StepInput& input) {
   Enter(WalkStage::kSwinging, input.time);
 }
 
-double Walk::Sunk(const StepInput& input) const {
+double QuasiStaticWalk::Sunk(const StepInput& input) const {
   const Foot s = stance_;
-  return spec_.quasi_static && spec_.ground.empty() ? sole_[s].Sunk(input.sole[s]) : 0;
+  return spec_.ground.empty() ? sole_[s].Sunk(input.sole[s]) : 0;
 }
 
-double Walk::GroundAt(const StepInput& input, const Footstep& foothold) const {
+double QuasiStaticWalk::GroundAt(const StepInput& input, const Footstep& foothold) const {
   const Vector3d stance = input.sole[stance_].translation();
   if (spec_.ground.empty()) return stance.z() + Sunk(input);
   // From sole to sole: what the estimator's height drifts by does not count.
@@ -231,79 +208,100 @@ double Walk::GroundAt(const StepInput& input, const Footstep& foothold) const {
          spec_.ground.At(stance_, stance.x());
 }
 
-double Walk::LoadOfSwing(const StepInput& input) const { return input.load[Other(stance_)]; }
+double QuasiStaticWalk::LoadOfSwing(const StepInput& input) const {
+  return input.load[Other(stance_)];
+}
 
-double Walk::Loaded(const StepInput& input) const {
+double QuasiStaticWalk::Loaded(const StepInput& input) const {
   return std::clamp(LoadOfSwing(input) / spec_.press_load, 0.0, 1.0);
 }
 
-double Walk::Missing(const StepInput& input) const {
+double QuasiStaticWalk::Missing(const StepInput& input) const {
   return std::clamp(1 - LoadOfSwing(input) / spec_.press_load, -1.0, 1.0);
 }
 
-bool Walk::Settled(const StepInput& input) {
-  if (spec_.quasi_static) {
-    // The sole has lain under its load for as long.
-    if (Loaded(input) < kPressed) pressed_since_ = input.time;
-    return input.time >= pressed_since_ + spec_.settle - kTimeTolerance;
-  }
-  // Not before the capture point is where both feet are to take it over.
-  const double since = std::max(since_, touch_down_);
-  return input.time >= since + spec_.settle - kTimeTolerance &&
-         LoadOfSwing(input) >= spec_.release_load;
+bool QuasiStaticWalk::Settled(const StepInput& input) {
+  // The sole has lain under its load for as long.
+  if (Loaded(input) < kPressed) pressed_since_ = input.time;
+  return input.time >= pressed_since_ + spec_.settle - kTimeTolerance;
 }
 
-void Walk::LetGo(const StepInput& input) {
+void QuasiStaticWalk::LetGo(const StepInput& input) {
   const Eigen::Isometry3d& sole = input.sole[Other(stance_)];
   const double period = TickPeriod(input.time - time_);
   const double share = period / (kLetGo * std::min(spec_.settle, kLongestLetGo) + period);
   // It goes on downward as far as it carries nothing: a tilted sole, or one that bounced.
-  double pulled = 0, missing = Missing(input);
-  if (!(spec_.press_share > 0)) {
-    // Comes to rest between the two loads, on a leg of any mass: there it counts as a contact.
-    pulled = std::clamp(
-        (LoadOfSwing(input) - spec_.release_load) / (spec_.touch_load - spec_.release_load), 0.0,
-        1.0);
-    missing = 1 - pulled;
-  }
-  stepping::LetGo(sole, share, pulled, period * missing * spec_.foot.touch_speed,
+  stepping::LetGo(sole, share, 0, period * Missing(input) * spec_.foot.touch_speed,
                   swing_.foothold().z() - search_depth_, &output_);
 }
 
-void Walk::Land(const StepInput& input, const StepState& state, const WalkCommand& command) {
+void QuasiStaticWalk::Land(const StepInput& input, const StepState& state,
+                           const WalkCommand& command) {
   ++num_steps_;
   in_contact_ = {true, true};
-  from_cop_ = wanted_.cop;
   const Foot foot = Other(stance_);
   sinks_[foot] =
       std::min(ExpectedSinking(sole_[foot].Sunk(input.sole[foot]), input.load[foot], spec_.weight),
                spec_.most_sinking);
   const double haste = spec_.sink_speed * (spec_.load + spec_.unload);
-  slower_ = spec_.quasi_static && sinks_[foot] > haste ? sinks_[foot] / haste : 1;
+  slower_ = sinks_[foot] > haste ? sinks_[foot] / haste : 1;
   course_ = Next(course_, Other(stance_));
   stance_ = Other(stance_);
   double_since_ = input.time;
   Enter(WalkStage::kLoading, input.time);
-  closings_ = closing_ ? closings_ + 1 : 0;
-  final_ = closing_ && (FeetTogether(state) || closings_ >= kMostClosing);
   command_ = Approach(command_, command, spec_.acceleration * spec_.period(),
                       spec_.turn_acceleration * spec_.period());
-  closing_ = !command_.stepping;
-  foothold_ = NextOnCourse(Standing(state, stance_), Other(stance_));
-  // The feet come to stand as they are, one on a tread, one on the next.
-  if (closing_ && (spec_.stand_apart || AcrossEdge(foothold_))) final_ = true;
+  // It stops as it stands: beside a foot on unknown ground, or on stairs, may be an edge.
+  final_ = !command_.stepping;
+  foothold_ = NextOnCourse({state.sole[stance_], state.sole_yaw[stance_]}, Other(stance_));
 }
 
-double Walk::Progress(double time) const {
-  const double past = time - since_;
-  if (stage_ == WalkStage::kUnloading) {
-    return spec_.quasi_static ? unloaded_ : std::clamp(past / spec_.unload, 0.0, 1.0);
+int QuasiStaticWalk::Planned(std::array<PlannedStep, kPlannedSteps>* steps) const {
+  if (!active() || final_) return 0;
+  double due = touch_down_;  // of a foot that swings
+  switch (stage_) {
+    case WalkStage::kStarting:
+      due = since_ + spec_.start + spec_.unload + spec_.swing;
+      break;
+    case WalkStage::kUnloading:
+      due = since_ + spec_.unload + spec_.swing;
+      break;
+    case WalkStage::kLoading:
+      due = since_ + spec_.load + spec_.unload + spec_.swing;
+      break;
+    default:
+      break;
   }
+  Footstep next = foothold_;
+  Foot foot = stepping_foot();
+  int count = 0;
+  for (PlannedStep& step : *steps) {
+    step = {next, foot, due + count * spec_.period()};
+    ++count;
+    foot = Other(foot);
+    next = Next(next, foot);
+  }
+  return count;
+}
+
+double QuasiStaticWalk::HighestForStep(const StepInput& input, const StepState& state) const {
+  const bool steps = stage_ == WalkStage::kUnloading || OnOneFoot();
+  if (!steps) return std::numeric_limits<double>::infinity();
+  const Foot s = stance_;
+  FootArray<Vector2d> offset{Vector2d::Zero(), Vector2d::Zero()};
+  offset[Other(s)] = Eigen::Rotation2Dd(-state.yaw) * (foothold_.position - state.sole[s]);
+  const double share = std::min(choice_.reach().LoweringShare(offset), 1.0);
+  return GroundAt(input, foothold_) + standing_height_ - share * choice_.reach().lowering();
+}
+
+double QuasiStaticWalk::Progress(double time) const {
+  const double past = time - since_;
+  if (stage_ == WalkStage::kUnloading) return unloaded_;
   // From what the press carries.
   return std::clamp(ramp_start_ + (1 - ramp_start_) * past / (slower_ * spec_.load), 0.0, 1.0);
 }
 
-void Walk::Unload(const StepState& state, double period) {
+void QuasiStaticWalk::Unload(const StepState& state, double period) {
   const Vector2d& stance = state.sole[stance_];
   const Vector2d way = state.sole[Other(stance_)] - stance;
   // The centre of pressure still has this share of the way to the sole that shall carry.
@@ -315,7 +313,8 @@ void Walk::Unload(const StepState& state, double period) {
       1.0, unloaded_ + std::clamp(most - unloaded_, kSlowestUnload * step, kFastestUnload * step));
 }
 
-balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& state) const {
+balance::ConvexPolygon QuasiStaticWalk::Carrying(const StepInput& input, const StepState& state,
+                                                 const Vector2d& cop) const {
   const double margin = choice_.limits().sole_margin;
   const Foot s = stance_, o = Other(s);
   const balance::ConvexPolygon sole =
@@ -326,8 +325,7 @@ balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& s
   if (stage_ == WalkStage::kStarting || stage_ == WalkStage::kStopping) return HullOf(sole, other);
   // Free of the ramp the load goes to the feet as the centre of pressure lies between them.
   const Vector2d way = state.sole[s] - state.sole[o];
-  const double free =
-      std::clamp((wanted_.cop - state.sole[o]).dot(way) / way.squaredNorm(), 0.0, 1.0);
+  const double free = std::clamp((cop - state.sole[o]).dot(way) / way.squaredNorm(), 0.0, 1.0);
   const bool loading = stage_ == WalkStage::kLoading;
   const double ramp = balance::SmoothStep(Progress(input.time));
   const double share = loading ? ramp * free : free + ramp * (1 - free);
@@ -340,74 +338,53 @@ balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& s
   return balance::ConvexHull({mixed.data(), corners});
 }
 
-CapturePlan::Point Walk::QuasiStatic(const StepState& state, double time) const {
+Vector2d QuasiStaticWalk::WantedCop(const StepState& state, double time) {
   const Vector2d& stance = state.sole[stance_];
   const Vector2d& other = state.sole[Other(stance_)];
   const double w = state.pendulum.frequency;
+  if (starting_) {
+    Vector2d cop;
+    for (int i = 0; i < 2; ++i) {
+      const Quintic::Point point = start_[static_cast<size_t>(i)].At(time);
+      wanted_[i] = point.position;
+      cop[i] = point.position - point.velocity / w;
+    }
+    return cop;
+  }
   const double pressed = pressed_.point().position, pressing = pressed_.point().velocity;
   if (OnOneFoot()) {
-    const Vector2d point = stance + pressed * (other - stance);
-    return {point, point - pressing / w * (other - stance)};
+    wanted_ = stance + pressed * (other - stance);
+    return wanted_ - pressing / w * (other - stance);
   }
   const Vector2d way = (final_ ? Vector2d(0.5 * (stance + other)) : stance) - other;
   // Minimum jerk, p = ξ − ξ̇/ω: towards the outer edge at first, never beyond the next middle.
   const balance::MinimumJerk gone(time - double_since_, Transfer());
   const double share = pressed + (1 - pressed) * gone.position;
   const double rate = pressing * (1 - gone.position) + (1 - pressed) * gone.speed;
-  const Vector2d point = other + share * way;
-  return {point, point - rate / w * way};
+  wanted_ = other + share * way;
+  return wanted_ - rate / w * way;
 }
 
-Vector2d Walk::DesiredCop(const StepInput& input, const StepState& state) {
-  const double w = state.pendulum.frequency, time = input.time;
-  const double due = touch_down_ + spec_.settle;
-  switch (stage_) {
-    case WalkStage::kStarting:
-    case WalkStage::kUnloading:
-      if (starting_) {
-        for (int i = 0; i < 2; ++i) {
-          const Quintic::Point point = start_[static_cast<size_t>(i)].At(time);
-          wanted_.capture_point[i] = point.position;
-          wanted_.cop[i] = point.position - point.velocity / w;
-        }
-        break;
-      }
-      [[fallthrough]];
-    case WalkStage::kLoading:
-    case WalkStage::kStopping:
-      wanted_ = spec_.quasi_static ? QuasiStatic(state, time) : plan_.At(time - double_since_);
-      break;
-    case WalkStage::kSwinging:
-    case WalkStage::kTouching:
-      if (spec_.quasi_static) {
-        wanted_ = QuasiStatic(state, time);
-        break;
-      }
-      wanted_ = plan_.At(spec_.single() - std::max(due - time, 0.0));
-      // Later than planned the capture point waits where it is, as far as the sole lets it.
-      wanted_.cop +=
-          balance::SmoothStep((time - due) / kStopTime) * (wanted_.capture_point - wanted_.cop);
-      break;
-    case WalkStage::kStanding:
-      break;
-  }
-  const Vector2d error = state.pendulum.capture_point() - wanted_.capture_point;
-  const balance::ConvexPolygon carrying = Carrying(input, state);
-  const Vector2d asked = balance::NearestPoint(carrying, wanted_.cop + (1 + spec_.gain) * error);
+Vector2d QuasiStaticWalk::DesiredCop(const StepInput& input, const StepState& state) {
+  const double time = input.time;
+  const Vector2d cop = WantedCop(state, time);
+  const Vector2d error = state.pendulum.capture_point() - wanted_;
+  const balance::ConvexPolygon carrying = Carrying(input, state, cop);
+  const Vector2d asked = balance::NearestPoint(carrying, cop + (1 + spec_.gain) * error);
   // A foot that lands at another time than planned makes no step of it.
   if (since_ == time && stage_ != WalkStage::kStarting) left_over_ = output_.cop - asked;
   const double left = 1 - balance::SmoothStep((time - since_) / kBlend);
   return balance::NearestPoint(carrying, asked + left * left_over_);
 }
 
-double Walk::SwingTime() const {
+double QuasiStaticWalk::SwingTime() const {
   const double sinks = sinks_[stance_];
-  if (!spec_.quasi_static || !(sinks > spec_.soft)) return spec_.swing;
-  return spec_.swing * std::min(std::sqrt(sinks / spec_.soft), spec_.slowest_swing);
+  if (!(sinks > spec_.soft)) return spec_.swing;
+  return spec_.swing * std::min(std::sqrt(sinks / spec_.soft), kSlowestSwing);
 }
 
-bool Walk::Lost(const StepInput& input) const {
-  if (!OnOneFoot() || !spec_.quasi_static) return false;
+bool QuasiStaticWalk::Lost(const StepInput& input) const {
+  if (!OnOneFoot()) return false;
   const StepState state = Observe(input, in_contact_);
   const Foot s = stance_;
   const balance::ConvexPolygon sole =
@@ -415,9 +392,10 @@ bool Walk::Lost(const StepInput& input) const {
   return -balance::SignedDistance(sole, state.pendulum.capture_point()) > 0;
 }
 
-Vector2d Walk::WithoutOffset(const StepState& state, const Vector2d& cop, double period) {
+Vector2d QuasiStaticWalk::WithoutOffset(const StepState& state, const Vector2d& cop,
+                                        double period) {
   // Two poles at the rate.
-  const double rate = spec_.offset_rate;
+  const double rate = kOffsetRate;
   const double w = state.pendulum.frequency;
   const Vector2d error = state.pendulum.capture_point() - reckoned_;
   const Vector2d asked = cop - offset_;
@@ -428,7 +406,7 @@ Vector2d Walk::WithoutOffset(const StepState& state, const Vector2d& cop, double
   return asked;
 }
 
-double Walk::StillSinks(const StepInput& input) {
+double QuasiStaticWalk::StillSinks(const StepInput& input) {
   const Foot s = stance_;
   // A sole that stands on one corner sinks farther than one that lies, under the same load: each
   // tick's is an upper bound.
@@ -440,17 +418,17 @@ double Walk::StillSinks(const StepInput& input) {
   return std::min(left, spec_.most_ahead);
 }
 
-double Walk::Height(const StepInput& input, const StepState& state) {
+double QuasiStaticWalk::Height(const StepInput& input, const StepState& state) {
   const Foot s = stance_, o = Other(s);
   const double lower = stage_ == WalkStage::kStopping ? 0 : spec_.com_lowering;
   const double stance = input.sole[s].translation().z(), other = input.sole[o].translation().z();
   // Before it sinks: its leg would be stretched.
-  const double low = spec_.quasi_static ? stance - StillSinks(input) : stance;
+  const double low = stance - StillSinks(input);
   const bool feels = stage_ != WalkStage::kSwinging || output_.searching;
   // Above the lower foot: a straight leg reaches no farther down.
   const double height = (feels ? std::min(low, other) : low) + standing_height_ - lower;
   const bool shifts = stage_ == WalkStage::kLoading || stage_ == WalkStage::kUnloading;
-  if (!spec_.quasi_static || !shifts || !(sinks_[s] > spec_.soft)) return height;
+  if (!shifts || !(sinks_[s] > spec_.soft)) return height;
   // While a foot sinks, above the higher one as far as the lower one's leg reaches: the ankle of a
   // leg that is bent above its sole comes to its limit first.
   double highest = std::max(stance, other) + standing_height_ - lower;
@@ -462,7 +440,7 @@ double Walk::Height(const StepInput& input, const StepState& state) {
   return std::max(height, highest);
 }
 
-void Walk::Lead(const StepInput& input, const StepState& state) {
+void QuasiStaticWalk::Lead(const StepInput& input, const StepState& state) {
   const double period = TickPeriod(input.time - time_);
   // A foot that is pressed carries: the sole of the other one shall do so by its middle still.
   const bool presses = stage_ == WalkStage::kTouching;
@@ -494,7 +472,7 @@ void Walk::Lead(const StepInput& input, const StepState& state) {
   output_.progress = output_.transition == 0 ? 0 : Progress(input.time);
 }
 
-void Walk::Archive(StateArchive* archive) {
+void QuasiStaticWalk::Archive(StateArchive* archive) {
   archive->Show(stage_, command_.velocity, command_.turn_rate, command_.stepping, stance_,
                 num_steps_, in_contact_);
   swing_.Archive(archive);
@@ -505,11 +483,9 @@ void Walk::Archive(StateArchive* archive) {
   for (PressedSole& sole : sole_) sole.Archive(archive);
   archive->Show(sinks_, slower_, search_depth_);
   archive->Show(time_, since_, moving_since_, double_since_, touch_down_, standing_height_,
-                start_yaw_, starting_, closing_, final_, closings_, pressed_since_,
-                course_.position, course_.yaw);
+                start_yaw_, starting_, final_, pressed_since_, course_.position, course_.yaw);
   archive->Show(unloaded_, lowered_);
-  archive->Show(foothold_.position, foothold_.yaw, from_cop_, wanted_.capture_point, wanted_.cop,
-                left_over_, reckoned_, offset_);
+  archive->Show(foothold_.position, foothold_.yaw, wanted_, left_over_, reckoned_, offset_);
   for (Quintic& quintic : start_) quintic.Archive(archive);
   output_.Archive(archive);
 }

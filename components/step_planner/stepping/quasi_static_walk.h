@@ -1,11 +1,11 @@
-// Walking: footsteps from a commanded velocity, the capture point led from foot to foot.
+// Walking on ground that is not known: the capture point waits above the sole that carries until
+// the other foot does too.
 #pragma once
 
 #include <Eigen/Core>
 #include <array>
 
 #include "components/framework/state_archive.h"
-#include "components/step_planner/stepping/capture_plan.h"
 #include "components/step_planner/stepping/footsteps.h"
 #include "components/step_planner/stepping/footwork.h"
 #include "components/step_planner/stepping/known_ground.h"
@@ -16,48 +16,39 @@
 namespace poise::stepping {
 
 /// Numbers that a robot or a scenario sets, in m, s, N.
-struct WalkSpec {
+struct QuasiStaticSpec {
   double start = 0;   ///< s in which the COM leaves the middle for the first stance foot
   double unload = 0;  ///< s of the ramp that unloads a foot
   double swing = 0;   ///< s
-  double settle = 0;  ///< s from a touch until the foot counts as a contact
+  double settle = 0;  ///< s under the press' load until a foot counts as a contact
   double load = 0;    ///< s of the ramp that loads it again
   FootstepLimits step;
   double acceleration = 0, turn_acceleration = 0;  ///< m/s², rad/s², of what is commanded
   SwingSpec foot;
   double touch_load = 0, touch_duration = 0;  ///< N, s
-  double release_load = 0;                    ///< N, below touch_load: a foot let go carries more
   double search_depth = 0;                    ///< m below the foothold
   double gain = 0;                            ///< of the capture point's error, > 0
-  double offset_rate = 0;                     ///< 1/s, of the pendulum's observed offset; 0: none
-  double most_offset = 0;                     ///< m
-  double adjust_from = 0;   ///< m of error at touch-down below which the foothold stays
-  double com_lowering = 0;  ///< m below standing at which it walks
+  double most_offset = 0;                     ///< m, of the pendulum's observed offset
+  double com_lowering = 0;                    ///< m below standing at which it walks
   double height_rate = 0, yaw_rate = 0;  ///< 1/s, with which height and heading of the body follow
   /// The robot is still: m from the soles' middle to the capture point, m/s of the COM, s of both.
   double still_distance = 0, still_speed = 0, still_time = 0;
-  bool quasi_static = false;  ///< the capture point waits above the stance sole until both carry
-  /// N with which a foot that has touched is pressed down; at least touch_load.
-  double press_load = 0;
-  double press_share = 0;        ///< of the weight that this is; 0: it only has to touch
+  double press_load = 0;         ///< N with which a foot that has touched is pressed down
+  double press_share = 0;        ///< of the weight that this is
   double lift_off_distance = 0;  ///< m from the stance sole's middle to the capture point, at most
   double most_return = 0;        ///< m, rad by which a foothold comes back to the course at most
-  bool stand_apart = false;      ///< at a stop; else the feet come side by side
   KnownGround ground;
-  /// m by which the load of a quasi-static foot may leave it sooner than the centre of pressure
-  /// does: what each sole's own is off its middle then.
+  /// m by which the load of a foot may leave it sooner than the centre of pressure does: what each
+  /// sole's own is off its middle then.
   double load_lead = 0;
-  double weight = 1;         ///< N, of the robot
-  double most_sinking = 0;   ///< m that a quasi-static sole is expected to sink at most
-  double most_ahead = 0;     ///< m by which the COM goes down at most before the stance sole does
-  double soft = 0;           ///< m of sinking under the weight, above which ground counts as soft
-  double slowest_swing = 1;  ///< ratio: a swing above soft ground to one above firm ground, at most
-  double sink_speed = 1;     ///< m/s of a sole's sinking, on average over the ramps: above 0
+  double weight = 1;        ///< N, of the robot
+  double most_sinking = 0;  ///< m that a sole is expected to sink at most
+  double most_ahead = 0;    ///< m by which the COM goes down at most before the stance sole does
+  double soft = 0;          ///< m of sinking under the weight, above which ground counts as soft
+  double sink_speed = 1;    ///< m/s of a sole's sinking, on average over the ramps: above 0
 
   /// s from touch-down to touch-down.
   double period() const { return unload + swing + settle + load; }
-  /// s on one foot.
-  double single() const { return swing + settle; }
 };
 
 enum class WalkStage {
@@ -74,10 +65,10 @@ enum class WalkStage {
 double RampStart(double share);
 
 /// Pure function of its calls; never allocates.
-class Walk {
+class QuasiStaticWalk {
  public:
-  Walk() = default;
-  Walk(const StepChoice& choice, const WalkSpec& spec);
+  QuasiStaticWalk() = default;
+  QuasiStaticWalk(const StepChoice& choice, const QuasiStaticSpec& spec);
 
   /// Once a tick. False: the robot stands, `output` is not to be used.
   bool Update(const StepInput& input, const WalkCommand& command);
@@ -92,8 +83,7 @@ class Walk {
     return num_steps_ + (under_way ? 1 : 0);
   }
   Foot stepping_foot() const { return Other(stance_); }  ///< that is in the air, or the next to be
-  /// On one foot of a quasi-static walk, the capture point is beyond the stance sole: the walk does
-  /// not bring it back.
+  /// On one foot, the capture point is beyond the stance sole: the walk does not bring it back.
   bool Lost(const StepInput& input) const;
   /// Another planner moves the feet in this tick.
   void Stop(double time) {
@@ -109,7 +99,7 @@ class Walk {
     double touch_down = 0;  ///< s, planned
   };
   static constexpr int kPlannedSteps = 3;
-  /// The step under way or next, and those that the plan counts with after it; how many there are.
+  /// The step under way or next, and those that follow if the command stays; how many there are.
   int Planned(std::array<PlannedStep, kPlannedSteps>* steps) const;
   const StepChoice& choice() const { return choice_; }
   double period() const { return spec_.period(); }   ///< s from touch-down to touch-down
@@ -119,7 +109,7 @@ class Walk {
   /// rad, rad/s, rad/s² about the vertical, of the body since it stood.
   const Quintic::Point& body_yaw() const { return body_yaw_.point(); }
   /// m, world: where the capture point shall be, before its error is fed back.
-  const CapturePlan::Point& wanted() const { return wanted_; }
+  const Eigen::Vector2d& wanted() const { return wanted_; }
   void Archive(StateArchive* archive);
 
  private:
@@ -131,12 +121,12 @@ class Walk {
   void LetGo(const StepInput& input);
   /// N on the foot that swings.
   double LoadOfSwing(const StepInput& input) const;
-  /// Share of the touch's load on the foot that comes down, at most 1.
+  /// Share of the press' load on the foot that comes down, at most 1.
   double Loaded(const StepInput& input) const;
   /// What is missing of the press' load, as a share of it, −1 to 1.
   double Missing(const StepInput& input) const;
   bool Settled(const StepInput& input);
-  /// m, by which the stance sole has sunk into unknown ground, in a quasi-static walk.
+  /// m, by which the stance sole has sunk into unknown ground.
   double Sunk(const StepInput& input) const;
   /// m, world: what is told of the ground, or where the stance sole met it, from where the other
   /// sole stands.
@@ -145,26 +135,19 @@ class Walk {
   double HighestForStep(const StepInput& input, const StepState& state) const;
   /// How far the ramp that is under way has come, 0 to 1.
   double Progress(double time) const;
-  /// The unloading ramp, in a quasi-static walk no sooner than the centre of pressure goes over.
+  /// The unloading ramp, no sooner than the centre of pressure goes over.
   void Unload(const StepState& state, double period);
   void Land(const StepInput& input, const StepState& state, const WalkCommand& command);
   bool OnOneFoot() const {
     return stage_ == WalkStage::kSwinging || stage_ == WalkStage::kTouching;
   }
   bool AtRest(const StepInput& input, const StepState& state);
-  Footstep Standing(const StepState& state, Foot foot) const;
   Footstep Next(const Footstep& stance, Foot foot) const;
   /// Next, brought back to the commanded course.
   Footstep NextOnCourse(const Footstep& stance, Foot foot) const;
-  /// The plan of a quasi-static walk: from above one sole to above the other while both carry.
-  CapturePlan::Point QuasiStatic(const StepState& state, double time) const;
   /// The foot may leave the ground.
   bool LiftsOff(const StepState& state, double time) const;
   double Transfer() const { return slower_ * (spec_.load + spec_.unload); }  ///< s
-  /// Plans anew from the first piece that is not over; `stance` is the sole that carries.
-  void PlanFrom(const StepState& state);
-  /// The swing's foothold, moved by what the centre of pressure cannot correct.
-  void Adjust(const StepInput& input, const StepState& state);
   /// What to ask for so that the capture point moves as of `cop`, m: what legs that swing and a
   /// body that turns add to the pendulum is observed, ξ̇ = ω (ξ − asked − offset), and taken off.
   Eigen::Vector2d WithoutOffset(const StepState& state, const Eigen::Vector2d& cop, double period);
@@ -175,19 +158,20 @@ class Walk {
   double Height(const StepInput& input, const StepState& state);
   /// m, that the stance sole goes down yet under the whole weight, as its load so far lets expect.
   double StillSinks(const StepInput& input);
-  /// Where the soles can have their common centre of pressure at the load that the ramp gives them.
-  balance::ConvexPolygon Carrying(const StepInput& input, const StepState& state) const;
+  /// Where the soles can have their common centre of pressure at the load that the ramp gives them,
+  /// for a centre of pressure that is wanted at `cop`.
+  balance::ConvexPolygon Carrying(const StepInput& input, const StepState& state,
+                                  const Eigen::Vector2d& cop) const;
+  /// From above one sole to above the other while both carry; sets `wanted_` too.
+  Eigen::Vector2d WantedCop(const StepState& state, double time);
   Eigen::Vector2d DesiredCop(const StepInput& input, const StepState& state);
-  bool FeetTogether(const StepState& state) const;
   /// A sole has sunk. The control of a phase that stands would stir it: the walk goes on without
   /// steps.
   bool OnSoftGround() const;
-  /// Side by side the foot that steps would stand across an edge that it is told of.
-  bool AcrossEdge(const Footstep& foothold) const;
   void Lead(const StepInput& input, const StepState& state);
 
   StepChoice choice_;
-  WalkSpec spec_;
+  QuasiStaticSpec spec_;
   WalkStage stage_ = WalkStage::kStanding;
   WalkCommand command_;
   Foot stance_ = Foot::kRight;
@@ -204,21 +188,17 @@ class Walk {
   FootArray<double> sinks_{0, 0};  // m, expected of each sole under the weight
   double search_depth_ = 0;        // m, below the foothold: as deep as the stance sole's ground
   double slower_ = 1;              // ratio: the ramps, where the sole sinks
-  double unloaded_ = 0;            // of the unloading ramp, where it is quasi-static
+  double unloaded_ = 0;            // of the unloading ramp
   double ramp_start_ = 0;          // of the loading ramp: what the press carries
   double standing_height_ = 0;     // m
   bool lowered_ = false;           // stopped while it walked: it has not stood up since
   double start_yaw_ = 0;           // rad
   bool starting_ = false;          // no foot has left the ground yet
-  bool closing_ = false;           // the step under way comes beside the other foot, the last one
-  bool final_ = false;             // it has
-  int closings_ = 0;               // last ones so far: on soft ground soles turn as they land
+  bool final_ = false;             // no step follows the one that has landed
   Footstep foothold_;
   Footstep course_;  // where the stance sole would stand if every step came down as commanded
-  Eigen::Vector2d from_cop_ = Eigen::Vector2d::Zero();  // m, when both feet were down
-  std::array<Quintic, 2> start_;                        // of the capture point while starting
-  CapturePlan plan_;                                    // made anew in every tick
-  CapturePlan::Point wanted_;
+  std::array<Quintic, 2> start_;                         // of the capture point while starting
+  Eigen::Vector2d wanted_ = Eigen::Vector2d::Zero();     // m
   Eigen::Vector2d reckoned_ = Eigen::Vector2d::Zero();   // m, capture point by the pendulum
   Eigen::Vector2d offset_ = Eigen::Vector2d::Zero();     // m, of the centre of pressure it obeys
   Eigen::Vector2d left_over_ = Eigen::Vector2d::Zero();  // m, of the last stage's at its end

@@ -1,0 +1,97 @@
+// The part of Recovery that walks.
+#include <cmath>
+
+#include "components/step_planner/stepping/recovery.h"
+
+namespace poise::stepping {
+namespace {
+
+using Eigen::Vector2d;
+
+// m by which a walk's foothold may miss its place before a recovery's step is looked for.
+constexpr double kMostMissed = 0.05;
+// Share of the standing height by which a push must have moved a walk's foothold for the step to
+// tell nothing of undisturbed ones.
+constexpr double kMoved = 0.08;
+constexpr double kTurnShare = 0.5;  // of the way between the soles' headings that the body takes
+
+}  // namespace
+
+Gait Recovery::gait(const StepState& state) const {
+  return {stride_.Corrected(command_), spec_.stride / state.pendulum.frequency, 0.5 * spec_.load,
+          spec_.gain};
+}
+
+StepPlan Recovery::WalkOn(const StepState& state, Foot foot, double unload,
+                          StepReason* reason) const {
+  StepPlan plan = choice_.Stride(state, foot, gait(state), unload);
+  *reason = StepReason::kWalk;
+  if (std::isfinite(plan.margin) && plan.missed < kMostMissed) return plan;
+  const StepPlan caught = choice_.Next(state, foot);
+  if (!caught.possible || !(caught.margin > plan.margin)) return plan;
+  *reason = StepReason::kAgain;
+  return caught;
+}
+
+Vector2d Recovery::WalkingPoint(const StepInput& input, const StepState& state, Foot stance,
+                                const balance::ConvexPolygon& support, double left) const {
+  const Vector2d body = ForBody(input, kSwingBudget);
+  StepState with = state;
+  with.pendulum.com += body / (1 + spec_.gain);
+  return choice_.StridePoint(with, stance, gait(state), left, support) - body;
+}
+
+void Recovery::SetOff(const StepInput& input, const StepState& state) {
+  // The foot of the side that it goes to is the first.
+  const double out = command_.velocity.y() != 0 ? command_.velocity.y() : command_.turn_rate;
+  plan_ = StepPlan();
+  plan_.foot = out > 0 ? Foot::kLeft : Foot::kRight;
+  reason_ = StepReason::kWalk;
+  BeginShift(input, state);
+  BeginTurning(state);
+}
+
+void Recovery::BeginTurning(const StepState& state) {
+  if (turns_) return;
+  turns_ = true;
+  stride_.Forget();
+  start_yaw_ = state.yaw;
+  body_yaw_.Begin(0);
+}
+
+void Recovery::TurnBody(const StepState& state, double period) {
+  if (!turns_) return;
+  const bool steps = stage_ == Stage::kUnloading || stage_ == Stage::kSwinging;
+  const Foot s = Other(plan_.foot);
+  const double other = steps ? plan_.yaw : state.sole_yaw[plan_.foot];
+  const double heading =
+      state.sole_yaw[s] + kTurnShare * std::remainder(other - state.sole_yaw[s], 2 * M_PI);
+  const double yaw = body_yaw_.point().position;
+  body_yaw_.Follow(yaw + std::remainder(heading - start_yaw_ - yaw, 2 * M_PI), period);
+}
+
+void Recovery::ShiftToStride(const StepInput& input, const StepState& state, double excess) {
+  if (excess > kLeastExcess) {
+    BeginStep(input, choice_.Choose(state), StepReason::kSure);
+  } else if (!command_.stepping) {
+    stage_ = Stage::kCatching;
+    since_ = moving_since_ = input.time;
+    cop_from_ = output_.cop;
+  } else if (input.time >= since_ + kSetOff - kTimeTolerance) {
+    StepReason reason = StepReason::kWalk;
+    const StepPlan plan = WalkOn(state, plan_.foot, choice_.limits().unload, &reason);
+    BeginStep(input, plan, reason);
+  }
+}
+
+void Recovery::CountStride(const StepInput& input) {
+  if (!command_.stepping || reason_ != StepReason::kWalk ||
+      plan_.moved > kMoved * standing_height_) {
+    stride_.Forget();
+    return;
+  }
+  const StepState state = Observe(input, in_contact_);
+  stride_.Land(input.time, 0.5 * (state.sole[0] + state.sole[1]), state.yaw, command_);
+}
+
+}  // namespace poise::stepping
