@@ -34,12 +34,16 @@ SwingFriction::SwingFriction(const FrictionCompensation& config, const robot::Ro
   }
 }
 
-void SwingFriction::Ramp(const FootArray<bool>& in_contact, double eta) {
+void SwingFriction::Ramp(const FootArray<bool>& in_contact, std::optional<Foot> ramped,
+                         double eta) {
   if (joints_.empty()) return;
   const FootArray<double> load{eta, 1 - eta};
   for (const Foot f : kFeet) {
     double open = 1;
-    if (in_contact[f]) open = load[f] < fade_load_ ? 1 - std::max(load[f], 0.0) / fade_load_ : 0;
+    if (in_contact[f]) {
+      const bool fades = ramped == f && load[f] < fade_load_;
+      open = fades ? 1 - std::max(load[f], 0.0) / fade_load_ : 0;
+    }
     swing_[f] = std::clamp(open, swing_[f] - rate_, swing_[f] + rate_);
   }
 }

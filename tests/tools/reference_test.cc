@@ -222,7 +222,7 @@ TEST(FieldRules, TheReferenceTellsThem) {
   EXPECT_EQ(fields[0].range, "0 to 1");
   EXPECT_THAT(FieldsAsText(fields, 80), HasSubstr("number, 0 to 1, default 0.02"));
   // The two parents of a group fill it differently.
-  for (const auto& [path, value] : {std::pair("step_planner.walk.motion.unload", "Default: 0.2."),
+  for (const auto& [path, value] : {std::pair("step_planner.walk.motion.unload", "Default: 0.8."),
                                     {"step_planner.recovery.motion.unload", "Default: 0.04."}}) {
     EXPECT_THAT(SelectFields(FieldReference(Schema::kScenario), path).at(0).meaning,
                 HasSubstr(value));

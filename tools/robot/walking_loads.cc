@@ -1,14 +1,15 @@
 #include "tools/robot/walking_loads.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
 #include "components/robot/dynamics.h"
 #include "components/robot/posture.h"
-#include "components/step_planner/stepping/swing.h"
 #include "components/step_planner/recovery_config.h"
+#include "components/step_planner/stepping/swing.h"
 
 namespace poise {
 namespace {
@@ -42,7 +43,7 @@ class Step {
       : model_(model),
         height_(robot::StandingHeight(model)),
         spec_(MakeRecoverySpec({}, {}, model, -1)),
-        spacing_(MakeStepChoice({}, model).limits().spacing),
+        limits_(MakeStepChoice({}, model).limits()),
         nominal_(stance.joint_position) {}
 
   /// s. The other foot leaves as the landed one has half of the load.
@@ -56,7 +57,7 @@ class Step {
   std::optional<std::vector<RobotState>> States(robot::Foot stance) const {
     const double side = -Side(stance);
     const double period = single() + both(), length = kCheckedSpeed * period;
-    const Vector3d across(0, side * spacing_, 0), ahead(length, 0, 0);
+    const Vector3d across(0, side * limits_.spacing, 0), ahead(length, 0, 0);
     const double turn = side * 2 * kCheckedTurn * period;  // outwards in every second step
     stepping::Swing swing;
     PointMotion from;
@@ -67,7 +68,7 @@ class Step {
     const double com_height = height_ - spec_.walk_lowering;
     const double omega = std::sqrt(robot::kGravity / com_height);
     const Orbit sagittal(omega, single(), both(), 0.5 * length, false);
-    const Orbit lateral(omega, single(), both(), 0.5 * spacing_, true);
+    const Orbit lateral(omega, single(), both(), 0.5 * limits_.spacing, true);
     std::vector<RobotState> states;
     robot::PostureGoal goal;
     goal.nominal = nominal_;
@@ -97,7 +98,8 @@ class Step {
     return states;
   }
 
-  /// N·m, of the motors: of the whole acceleration, on the sole of `stance` alone, and of friction.
+  /// N·m, of the motors: of the whole acceleration, on the sole of `stance` alone, as far as that
+  /// has room for its centre of pressure, and of friction.
   VectorXd Torque(const RobotState& state, const VectorXd& acceleration, robot::Foot stance) const {
     robot::RobotData data(model_);
     robot::ComputeKinematics(model_, state, &data);
@@ -105,8 +107,14 @@ class Step {
     robot::ComputeDynamics(model_, state, &data);
     const VectorXd force = data.mass_matrix * acceleration + data.bias + data.gravity;
     const auto& jacobian = data.foot_jacobian[stance];
-    const robot::Vector6d wrench =
+    robot::Vector6d wrench =
         jacobian.leftCols<6>().transpose().partialPivLu().solve(force.head<6>());
+    // What the sole cannot give turns the body.
+    const robot::FootModel& foot = model_.feet()[stance];
+    const double roll = (0.5 * foot.width - limits_.sole_margin) * std::abs(wrench[2]);
+    const double pitch = (0.5 * foot.length - limits_.sole_margin) * std::abs(wrench[2]);
+    wrench[3] = std::clamp(wrench[3], -roll, roll);
+    wrench[4] = std::clamp(wrench[4], -pitch, pitch);
     VectorXd torque = force.tail(model_.num_joints()) -
                       jacobian.rightCols(model_.num_joints()).transpose() * wrench;
     for (int j = 0; j < model_.num_joints(); ++j) {
@@ -127,7 +135,7 @@ class Step {
   const robot::RobotModel& model_;
   double height_;
   stepping::RecoverySpec spec_;
-  double spacing_;
+  stepping::StepLimits limits_;
   VectorXd nominal_;
 };
 

@@ -92,6 +92,7 @@ bool Recovery::Update(const StepInput& input) {
         together_asked_ = false;
         together_at_ = -1;
         plan_ = plan;
+        reason_ = StepReason::kTogether;
         BeginShift(input, state);
       }
       step_helps_ = true;
