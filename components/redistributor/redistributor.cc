@@ -133,10 +133,7 @@ void Redistributor::Redistribute(const Tick& tick) {
     return;
   }
   out.status = Count(in_contact) == 2 ? ComputeDouble(tick) : ComputeSingle(in_contact);
-  std::optional<Foot> ramped;
-  if (support_plan_->transition != support_plan_t::TRANSITION_NONE) {
-    ramped = robot::FootAt(support_plan_->transition_foot);
-  }
+  const bool ramped = support_plan_->transition != support_plan_t::TRANSITION_NONE;
   swing_friction_.Ramp(in_contact, ramped, out.eta);
   if (impedance_.enabled() || swing_friction_.acts()) FollowMotion(in_contact);
 }

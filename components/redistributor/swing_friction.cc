@@ -34,14 +34,13 @@ SwingFriction::SwingFriction(const FrictionCompensation& config, const robot::Ro
   }
 }
 
-void SwingFriction::Ramp(const FootArray<bool>& in_contact, std::optional<Foot> ramped,
-                         double eta) {
+void SwingFriction::Ramp(const FootArray<bool>& in_contact, bool ramped, double eta) {
   if (joints_.empty()) return;
   const FootArray<double> load{eta, 1 - eta};
   for (const Foot f : kFeet) {
     double open = 1;
     if (in_contact[f]) {
-      const bool fades = ramped == f && load[f] < fade_load_;
+      const bool fades = ramped && load[f] < fade_load_;
       open = fades ? 1 - std::max(load[f], 0.0) / fade_load_ : 0;
     }
     swing_[f] = std::clamp(open, swing_[f] - rate_, swing_[f] + rate_);

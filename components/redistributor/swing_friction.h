@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -32,10 +31,9 @@ class SwingFriction {
   SwingFriction(const FrictionCompensation& config, const robot::RobotModel& model, double period);
 
   /// Once a tick, before Add: leads what each leg gets to what its foot leaves open, 1 out of
-  /// contact, less with its load where that is `ramped`, 0 else. A foot that a push unloads gets
-  /// nothing: friction damps it. `eta`: share of F_z that the right foot carries.
-  void Ramp(const robot::FootArray<bool>& in_contact, std::optional<robot::Foot> ramped,
-            double eta);
+  /// contact; where a foot's load is `ramped`, less with its load; else 0. A foot that a push
+  /// unloads gets nothing: friction damps it. `eta`: share of F_z that the right foot carries.
+  void Ramp(const robot::FootArray<bool>& in_contact, bool ramped, double eta);
   /// Whether Add would add anything.
   bool acts() const { return swing_[robot::Foot::kRight] > 0 || swing_[robot::Foot::kLeft] > 0; }
   /// Adds to `torque` (N·m, by joint). `velocity` rad/s and `acceleration` rad/s² by joint. A joint

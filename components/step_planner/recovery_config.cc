@@ -204,6 +204,7 @@ stepping::RecoverySpec MakeRecoverySpec(const RecoveryConfig& config,
   spec.together_after = config.together_after();
   spec.stride = kStride;
   spec.walk_lowering = MostLowering(model, kWalkLowering * robot::StandingHeight(model));
+  spec.holding_lowering = MostLowering(model, motion.com_lowering());
   spec.acceleration = kAcceleration * robot::kGravity;
   spec.turn_acceleration = kTurnAcceleration;
   spec.yaw_rate = kYawRate;

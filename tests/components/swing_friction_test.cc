@@ -31,7 +31,7 @@ FrictionCompensation Config(double share) {
 /// On its right foot for so long that the left leg's share is all there.
 SwingFriction OnTheRightFoot(const robot::RobotModel& model, double share) {
   SwingFriction friction(Config(share), model, kPeriod);
-  for (int tick = 0; tick < 100; ++tick) friction.Ramp({true, false}, {}, 1);
+  for (int tick = 0; tick < 100; ++tick) friction.Ramp({true, false}, false, 1);
   return friction;
 }
 
@@ -144,7 +144,7 @@ TEST(SwingFrictionTest, ComesAndGoesWithoutAStep) {
   for (int tick = 0; tick < 300; ++tick) {
     // Both feet; the left one up, down within the ramp, up for long; both, the load at once.
     const bool left_stands = tick < 10 || (tick >= 20 && tick < 28) || tick >= 200;
-    friction.Ramp({true, left_stands}, {}, left_stands ? 0.5 : 1);
+    friction.Ramp({true, left_stands}, false, left_stands ? 0.5 : 1);
     std::vector<double> torque(count, 0.0);
     friction.Add(velocity, acceleration, torque);
     for (size_t j = 0; j < count; ++j) {
@@ -175,18 +175,18 @@ TEST(SwingFrictionTest, ComesAsTheLoadGoes) {
     const auto at = static_cast<size_t>(AnkleOf(model, light));
     const auto loaded = static_cast<size_t>(AnkleOf(model, Other(light)));
     // A foot that a push unloads, off any ramp, is left to its friction.
-    friction.Ramp({true, true}, {}, light == robot::Foot::kRight ? 0 : 1);
+    friction.Ramp({true, true}, false, light == robot::Foot::kRight ? 0 : 1);
     EXPECT_FALSE(friction.acts());
     double before = 0;
     for (double share = 0.5; share > -0.1; share -= 0.1) {
       const double eta = light == robot::Foot::kRight ? share : 1 - share;
-      for (int tick = 0; tick < 100; ++tick) friction.Ramp({true, true}, light, eta);
+      for (int tick = 0; tick < 100; ++tick) friction.Ramp({true, true}, true, eta);
       std::vector<double> torque(count, 0.0);
       friction.Add(velocity, rest, torque);
       EXPECT_GE(torque[at], before);
       EXPECT_EQ(torque[loaded], 0);
       before = torque[at];
-      airborne.Ramp({true, true}, light, eta);
+      airborne.Ramp({true, true}, true, eta);
       EXPECT_FALSE(airborne.acts());
     }
     EXPECT_NEAR(before, kShare * FrictionTorque(model.motors()[at], 1, kSmoothing), 1e-9);

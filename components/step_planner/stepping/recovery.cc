@@ -461,8 +461,11 @@ bool Recovery::AtRest(const StepInput& input, const StepState& state) {
 }
 
 double Recovery::LoweringShare(const StepState& state) const {
-  double share = 0;
-  if (command_.stepping) share = spec_.walk_lowering / choice_.reach().lowering();
+  const double lowering = choice_.reach().lowering();
+  double share = 0, most = 1;
+  if (command_.stepping) share = spec_.walk_lowering / lowering;
+  // Nothing is to be caught, and knees that are bent for seconds get hot.
+  if (reason_ == StepReason::kTogether) most = std::min(most, spec_.holding_lowering / lowering);
   // A walk keeps its height: a COM that comes down with each step brings its foot down too soon.
   if (!command_.stepping || reason_ != StepReason::kWalk) {
     const Eigen::Matrix2d turn = Eigen::Rotation2Dd(-state.yaw).toRotationMatrix();
@@ -476,7 +479,7 @@ double Recovery::LoweringShare(const StepState& state) const {
     }
     share = std::max(share, choice_.reach().LoweringShare(offset));
   }
-  return std::min(share, 1.0);
+  return std::min(share, most);
 }
 
 void Recovery::LeadCom(const StepInput& input, const StepState& state) {

@@ -33,6 +33,8 @@ struct RecoverySpec {
   double together_after = 0;  ///< s at rest until the feet are put side by side; 0: when asked
   double stride = 0;          ///< of a walk's step, its time times ω
   double walk_lowering = 0;   ///< m by which the COM walks lower than it stands
+  /// m by which it can be lower than it stands on one leg for as long as one likes.
+  double holding_lowering = 0;
   double acceleration = 0, turn_acceleration = 0;  ///< m/s², rad/s², of what is walked
   double yaw_rate = 0;  ///< 1/s, with which the body's heading follows the feet's
 };
