@@ -571,41 +571,31 @@ def _(task):
 @reads_row("walking", "Six robots")
 def _(task, i, first, _):
     figures = [task.command(task.told(), NAME=robot(first), W=world).summary()[0] for world in WORLDS]
-    for place, f in enumerate(figures, 1):
-        task.put(i, place, f["steps"], f["walk_way"])
-    put_each(task, i, 3, figures, "torque_step_max", "joint_torque_share")
+    put_each(task, i, 1, figures, "steps", "walk_way", "walk_course_share", "walk_turn_share", "walk_cost_of_transport",
+             "joint_torque_share", "violated_ticks")
 
 
-@reads_row("walking", "The paper's robot walks")
-def _(task, i, first, cells):
-    speed, longest = re.match(r"[\d.]+", first)[0], re.search(r"`(longest=[\d.]+)`", first)
-    more = f"--set step_planner.walk.{longest[1]} " if longest else ""
-    figures = [task.command(task.told(), f"{more}--world {world}", V=speed).summary()[0] for world in WORLDS]
-    put_each(task, i, 1, figures, "walk_speed_max", "walk_velocity_error_rms", "walk_cost_of_transport", "violated_ticks",
-             "torque_step_max", "joint_torque_share")
-
-
-@reads_row("dynamic_walking", "Six robots")
+@reads_row("walking", "They walk at a quarter")
 def _(task, i, first, cells):
     figures = [task.command(task.told(), NAME=robot(first), W=world, V=cells[1]).summary()[0] for world in WORLDS]
     put_each(task, i, 2, figures, "walk_speed_max", "walk_course_share", "walk_cost_of_transport", "joint_torque_share",
              "violated_ticks")
 
 
-@reads("walking", "It walked an hour")
-def _(task):
-    made = task.command(task.told())
-    figures, _ = made.summary()
-    task.put(0, 0, figures["steps"], figures["walk_way"])
-    put_each(task, 0, 2, [figures], "walk_velocity_error_rms", "torque_step_max", "joint_torque_share", "walk_cost_of_transport")
-    task.put(0, 6, made.processor, GIVEN)
+@reads_row("walking", "Without compensated friction")
+def _(task, i, first, _):
+    for place, more in ((1, "--set redistributor.friction_compensation.share=0"), (2, "")):
+        runs = [task.command(task.told(), more, NAME=robot(first), W=world).summary()[0] for world in WORLDS]
+        task.put(i, place, *("falls" if run["fallen"] else run["walk_cost_of_transport"] for run in runs))
 
 
-@reads_row("walking", "With it iCub")
-def _(task, i, first, cells):
-    off = "--set redistributor.friction_compensation.share=0"
-    figures = [task.command(task.told(), more, NAME=robot(first), V=cells[1]).summary()[0] for more in (off, "")]
-    put_each(task, i, 2, figures, "violated_ticks", "joint_torque_share")
+@reads_row("steps_by_robot", "G1 stands")
+def _(task, i, first, _):
+    rows = task.command(task.told(), NAME=robot(first)).table()
+    sizes = sorted({row["size"] for row in rows}, key=float)
+    for place, size in enumerate(sizes, 1):
+        task.put(i, place, len(stands([row for row in rows if row["size"] == size])))
+    task.put(i, 6, next(float(row["push_impulse"]) for row in rows if row["size"] == sizes[0]))
 
 
 @reads_row("drives", "7.5 stands")
@@ -619,8 +609,8 @@ def _(task, i, _, cells):
 WITHOUT = {  # tables of no reader, and why
     ("drives", "Of 100 faults"): "the test prints no counts of what ended how, and faults come at random moments",
     ("drives", "A million broken"): "passing is the figure; two of the three need build/sanitize: run the rows by hand",
-    ("dynamic_walking", "A push in a walk"): "FILE is an import of a maker's file that is no robot of deploy/robots",
-    ("dynamic_walking", "The tour"): "FILE is an import of a maker's file that is no robot of deploy/robots",
+    ("walking", "A push in a walk"): "FILE is an import of a maker's file that is no robot of deploy/robots",
+    ("walking", "The tour"): "FILE is an import of a maker's file that is no robot of deploy/robots",
     ("engines", "The engine takes"): "perf record names no run, and symbols are sorted by hand",
     ("gains", "The rule gives"): "no run: the linear model of tests/balance/gains_test.cc with that day's robots' files",
     ("gains", "Stiffness and damping"): "its fields stand in the lab, and energy above 30 Hz is no metric",
@@ -629,7 +619,4 @@ WITHOUT = {  # tables of no reader, and why
     ("speed", "A hundred faults"): "real time on a machine that is kept busy on purpose: run the rows by hand",
     ("speed", "From sensors"): "real time of an idle and a busy machine: run the rows by hand",
     ("speed", "An hour in one process"): "times of a machine, with logs of 13 GB: run the rows by hand",
-    ("steps_by_robot", "The variant of `push`"): "the command tries 5 of the values that the rows have",
-    ("walking", "Compensated friction"): "the soles' tilt at touch-down is no metric and no figure of an event",
-    ("walking", "Half of the friction"): "the soles' tilt is no metric, and rows differ in what they tell",
 }
