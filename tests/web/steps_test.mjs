@@ -20,7 +20,7 @@ const poise = poiseCaller(options.poise);
 let browser;
 
 before(async () => {
-  poise('run', 'walk', '--inline', '--duration', '7', '--out', path('walk'));
+  poise('run', 'walk', '--variant', 'ahead', '--inline', '--set', 'duration=7', '--out', path('walk'));
   poise('run', 'push_double_support', '--variant', 'step', '--inline', '--duration', '3', '--out', path('step'));
   browser = await launchBrowser(options.web);
 });
