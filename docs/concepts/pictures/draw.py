@@ -428,9 +428,10 @@ def walking():
         side = -1 if int(clock / time) % 2 == 0 else 1
         cop = side * SOLE_Y if walks else xi + gain * xi
         course.append((clock, xi, cop, com))
-        xi += dt * OMEGA * (xi - cop)
-        com += dt * OMEGA * (xi - com)
-        clock += dt
+        for _ in range(4):
+            xi += dt * OMEGA * (xi - cop)
+            com += dt * OMEGA * (xi - com)
+        clock += 4 * dt
     axes.curve([(t, cop) for t, _, cop, _ in course], "b d")
     axes.curve([(t, xi) for t, xi, _, _ in course], "a")
     axes.curve([(t, com) for t, _, _, com in course], "l")
