@@ -72,8 +72,9 @@ void ReportPlanned(const FootstepInput& input, const stepping::Recovery* recover
         out);
   }
   out->planned = static_cast<int8_t>(count);
-  for (int i = count; i < QuasiStaticWalk::kPlannedSteps; ++i)
+  for (int i = count; i < QuasiStaticWalk::kPlannedSteps; ++i) {
     Put(i, Foot::kRight, {0, 0}, 0, 0, 0, out);
+  }
 }
 
 }  // namespace

@@ -62,8 +62,8 @@ bool Raises(const robot::RobotModel& model, double clearance) {
   return true;
 }
 
-/// Of the torque of each joint of the leg, the share with which `foot` alone holds the robot, the
-/// COM above it, `lowering` m lower than standing; 0 where there is no such posture.
+/// What each joint of the leg needs of its torque, as a share, while `foot` alone holds the robot,
+/// the COM above it, `lowering` m lower than standing; 0 where there is no such posture.
 Eigen::VectorXd HoldingShares(const robot::RobotModel& model, robot::Foot foot, double lowering) {
   Eigen::VectorXd shares = Eigen::VectorXd::Zero(model.num_joints());
   robot::PostureGoal goal = robot::StandingGoal(model);
@@ -121,13 +121,15 @@ double LongestStride(const stepping::Reach& reach, double spacing) {
 }
 
 double MostLowering(const robot::RobotModel& model, double wanted) {
+  // A joint that needs more of its torque anyway, as a hip that holds the other leg, is no reason.
+  robot::FootArray<Eigen::VectorXd> most;
+  for (const robot::Foot foot : robot::kFeet) {
+    const Eigen::VectorXd standing = HoldingShares(model, foot, 0);
+    most[foot] = (standing.array() * kMoreThanStanding).max(kHoldingShare);
+  }
   const auto holds = [&](double lowering) {
     return std::ranges::all_of(robot::kFeet, [&](robot::Foot foot) {
-      // A joint that needs more of its torque anyway, as a hip that holds the other leg, is no
-      // reason.
-      const Eigen::VectorXd standing = HoldingShares(model, foot, 0);
-      const Eigen::VectorXd most = (standing.array() * kMoreThanStanding).max(kHoldingShare);
-      return (HoldingShares(model, foot, lowering).array() <= most.array()).all();
+      return (HoldingShares(model, foot, lowering).array() <= most[foot].array()).all();
     });
   };
   return holds(wanted) ? wanted : Largest(wanted, holds);

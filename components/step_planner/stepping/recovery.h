@@ -112,7 +112,7 @@ class Recovery {
   Eigen::Vector2d BrakingPoint(const StepInput& input, const StepState& state) const;
   Eigen::Vector2d CatchingPoint(const StepInput& input, const StepState& state) const;
   Eigen::Vector2d Goal(const StepState& state) const;
-  /// Of the command, corrected by what the last strides came to.
+  /// The gait of the command, which is corrected by what the last strides came to.
   Gait gait(const StepState& state) const;
   /// The step of a walk, or of a recovery where the walk's misses its place.
   StepPlan WalkOn(const StepState& state, Foot foot, double unload, StepReason* reason) const;
@@ -127,7 +127,7 @@ class Recovery {
   /// From rest: the capture point on its way there; then the first step, or one that a push asks
   /// for.
   void ShiftToStride(const StepInput& input, const StepState& state, double excess);
-  /// A foot has landed.
+  /// Tells the correction of a foot that has landed; a step that a push has moved tells nothing.
   void CountStride(const StepInput& input);
   /// The body's heading follows the feet's from now on.
   void BeginTurning(const StepState& state);
