@@ -271,6 +271,15 @@ void Session::Walk(std::optional<Eigen::Vector3d> velocity) {
   Do(std::move(act));
 }
 
+void Session::Move(const std::string& joint, double angle, double duration) {
+  OperatorAct act;
+  act.kind = OperatorAct::Kind::kMove;
+  act.name = joint;
+  act.value = angle;
+  act.duration = duration;
+  Do(std::move(act));
+}
+
 void Session::Do(OperatorAct act) {
   const Lock lock(this);
   if (!port_) {

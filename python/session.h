@@ -60,6 +60,9 @@ class Session {
   /// m/s ahead, m/s to the left, rad/s to the left, from the next tick on; empty: it stops. Throws
   /// ConfigError, or the Step after it does: a planner that does not walk, numbers out of range.
   void Walk(std::optional<Eigen::Vector3d> velocity);
+  /// A joint that no leg needs comes to rest at `angle`, rad, in `duration` s, or in as many more
+  /// as its limits ask for. Throws ConfigError, or the Step after it does.
+  void Move(const std::string& joint, double angle, double duration);
   /// The joint's commanded torque (N·m) in place of the redistributor's; empty: no longer. Throws
   /// ConfigError: no such joint, not finite.
   void OverrideTorque(int joint, std::optional<double> torque);

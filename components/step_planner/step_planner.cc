@@ -444,7 +444,7 @@ void StepPlanner::UpdateReferences(double time, const Capture& capture) {
   if (hip_strategy_->enabled()) TiltBody(time, capture);
 }
 
-void StepPlanner::TurnBody(const stepping::Quintic::Point& yaw) {
+void StepPlanner::TurnBody(const Quintic::Point& yaw) {
   const Eigen::AngleAxisd turn(yaw.position, Eigen::Vector3d::UnitZ());
   references_.body.rotation = turn * references_.body.rotation;
   references_.body.angular_velocity.z() += yaw.velocity;

@@ -79,7 +79,7 @@ class StepPlanner : public Component, public Operated {
   /// The schedule waits.
   bool Held() const { return owner_ != FeetOwner::kPhases; }
   /// The body's heading follows the feet.
-  void TurnBody(const stepping::Quintic::Point& yaw);
+  void TurnBody(const Quintic::Point& yaw);
   /// Contacts, references and landings of a phase's first tick.
   void BeginPhase(double time);
   Capture ComputeCapture() const;

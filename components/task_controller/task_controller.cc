@@ -73,20 +73,22 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
   for (const FeetInContact& feet : {FeetInContact{true, true}, {true, false}, {false, true}}) {
     CheckRows(*tasks_, *model_, feet, others);
   }
-  if (config.joint_limits()) {
-    limits_.emplace(*model_, balance::LimitHorizon(*model_, context.tick_period));
-  }
+  const balance::JointLimits limits(*model_, balance::LimitHorizon(*model_, context.tick_period));
+  if (config.joint_limits()) limits_ = limits;
   for (const Foot f : kFeet) {
     leg_[f].assign(static_cast<size_t>(num_joints), 0);
     for (const int joint : model_->supporting_joints(model_->feet()[f].body)) {
       leg_[f][static_cast<size_t>(joint)] = 1;
     }
   }
+  std::vector<char> stays = leg_[Foot::kRight];
+  for (size_t j = 0; j < stays.size(); ++j) stays[j] |= leg_[Foot::kLeft][j];
+  posture_.emplace(limits, stays, context.tick_period);
 
   whole_body_ = context.shared->Get<balance::WholeBody>(
       "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
   state_ = robot::RobotState(num_joints);
-  posture_reference_ = posture_acceleration_ = posture_torque_ = torque_ = free_torque_ =
+  posture_acceleration_ = posture_torque_ = torque_ = free_torque_ =
       Eigen::VectorXd::Zero(num_joints);
   acceleration_ = Eigen::VectorXd::Zero(model_->num_velocities());
 
@@ -117,7 +119,17 @@ void TaskController::AddSettings(double tick_period) {
 }
 
 void TaskController::TakeActs(const Tick& tick) {
-  while (operator_.Next(tick) != nullptr) operator_.Answer(operate::answer_t::VERDICT_UNKNOWN);
+  using operate::answer_t;
+  while (const operate::act_t* const act = operator_.Next(tick)) {
+    if (act->kind != operate::act_t::KIND_JOINT) {
+      operator_.Answer(answer_t::VERDICT_UNKNOWN);
+    } else if (!started_ || support_plan_->gravity_compensation != 0) {
+      operator_.Answer(answer_t::VERDICT_NOT_NOW);
+    } else {
+      operator_.Answer(posture_->Move(*act, tick.time));
+    }
+  }
+  posture_->Update(tick.time);
   if (operator_.settings().Advance(tick.index)) SetGains();
 }
 
@@ -142,7 +154,8 @@ void TaskController::FollowGround() {
 }
 
 bool TaskController::Archive(StateArchive* archive) {
-  archive->Show(in_contact_, started_, posture_reference_, base_velocity_);
+  archive->Show(in_contact_, started_, base_velocity_);
+  posture_->Archive(archive);
   operator_.Archive(archive);
   if (soft_ground_) soft_ground_->Archive(archive);
   if (archive->restoring()) SetGains();
@@ -169,7 +182,7 @@ int8_t TaskController::Control() {
   if (!started_ || plan.gravity_compensation != 0) {
     started_ = true;
     base_velocity_ << state_.base_linear_velocity, state_.base_angular_velocity;
-    posture_reference_ = state_.joint_position;
+    posture_->Hold(state_.joint_position);
     tasks_->Hold(state);
   }
   Eigen::Vector3d orientation_error = Eigen::Vector3d::Zero();
@@ -201,8 +214,9 @@ void TaskController::SmoothBase(const support_plan_t& plan) {
 }
 
 void TaskController::ComputePosture() {
-  posture_acceleration_ = gains_.posture.kp * (posture_reference_ - state_.joint_position) -
-                          gains_.posture.kd * state_.joint_velocity;
+  posture_acceleration_ = gains_.posture.kp * (posture_->position() - state_.joint_position) -
+                          gains_.posture.kd * (state_.joint_velocity - posture_->velocity()) +
+                          posture_->acceleration();
   if (!limits_) return;
   for (int j = 0; j < posture_acceleration_.size(); ++j) {
     const balance::AccelerationRange range =

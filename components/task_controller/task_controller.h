@@ -10,6 +10,7 @@
 #include "components/framework/component.h"
 #include "components/framework/operator_acts.h"
 #include "components/robot/robot_model.h"
+#include "components/task_controller/posture_reference.h"
 #include "components/task_controller/soft_ground.h"
 #include "components/task_controller/task_list.h"
 #include "poise/robot_state_t.hpp"
@@ -70,12 +71,13 @@ class TaskController : public Component, public Operated {
   balance::StandingGains gains_;           // before what the ground takes off them
   std::optional<SoftGround> soft_ground_;  // none: the COM's gains are given
   balance::TaskGains com_gains_;           // as the tasks have them
+  std::optional<PostureReference> posture_;
   std::optional<balance::JointLimits> limits_;  // none: they do not enter the control
   std::array<TaskList::ForcedJoint, TaskList::kMostForced> forced_;
   size_t num_forced_ = 0;
   robot::FootArray<std::vector<char>> leg_;  // the joint lies between the foot and the base
   Eigen::VectorXd acceleration_;             // n×1
-  Eigen::VectorXd posture_reference_, posture_acceleration_, posture_torque_;
+  Eigen::VectorXd posture_acceleration_, posture_torque_;
   Eigen::VectorXd torque_, free_torque_;
 };
 

@@ -25,6 +25,8 @@ std::string ActKindName(int8_t kind) {
       return "feet side by side";
     case act_t::KIND_NEXT_PHASE:
       return "next phase";
+    case act_t::KIND_JOINT:
+      return "move of a joint";
     default:
       return fmt::format("act of kind {}", kind);
   }
@@ -42,7 +44,8 @@ std::string RefusalReason(int8_t kind, int8_t verdict) {
     case answer_t::VERDICT_UNKNOWN:
       return "the component does not know it";
     case answer_t::VERDICT_RANGE:
-      return "a number is out of range";
+      return kind == act_t::KIND_JOINT ? "the angle is outside the joint's range"
+                                       : "a number is out of range";
     case answer_t::VERDICT_NOT_ABLE:
       if (stand) {
         return "this run's step_planner does not step; its scenario needs "
@@ -52,6 +55,10 @@ std::string RefusalReason(int8_t kind, int8_t verdict) {
         return "this run's step_planner does not walk; its scenario needs "
                "base: \"base/walking\"";
       }
+      if (kind == act_t::KIND_JOINT) {
+        return "this joint is a leg's, which keep the balance; arms, hands, head and waist can be "
+               "moved";
+      }
       return "this run's configuration does not allow it";
     case answer_t::VERDICT_NOT_NOW:
       if (stand || kind == act_t::KIND_STEP) {
@@ -59,6 +66,9 @@ std::string RefusalReason(int8_t kind, int8_t verdict) {
       }
       if (kind == act_t::KIND_NEXT_PHASE) {
         return "not now: nothing follows this phase, or its moves are not over; try again later";
+      }
+      if (kind == act_t::KIND_JOINT) {
+        return "not now: no posture is held yet, or the phase compensates gravity alone";
       }
       return "not now; try again later";
     default:

@@ -118,6 +118,13 @@ void BindSession(py::module_* module) {
                return 0;
              });
            })
+      .def("move",
+           [](Session& session, const std::string& joint, double angle, double duration) {
+             Unlocked([&] {
+               session.Move(joint, angle, duration);
+               return 0;
+             });
+           })
       .def("override_torque",
            [](Session& session, int joint, std::optional<double> torque) {
              Unlocked([&] {

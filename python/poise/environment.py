@@ -129,6 +129,16 @@ class Environment:
         """Stops walking, the feet side by side."""
         self._session.walk(None)
 
+    def upper_body(self, angles, duration=0.1):
+        """Sends joints that no leg needs, arms, hands, head or waist, to `angles`, {name: rad}, from the next tick on.
+
+        Each comes to rest there in `duration` s, longer where its limits of velocity and acceleration ask for it, from whatever
+        motion it is in: who sends a target each 0.02 s, as a teleoperator or a policy does, takes some 0.1 s. The balance is
+        kept meanwhile, with what the moving joints ask for in the torques.
+        """
+        for joint, angle in angles.items():
+            self._session.move(joint, float(angle), float(duration))
+
     def override_torque(self, joint, torque):
         """N·m that the bridge is commanded for a joint (name or index) in the controller's place; None: no longer."""
         if isinstance(joint, str):

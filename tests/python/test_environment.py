@@ -60,6 +60,34 @@ class Steps(unittest.TestCase):
             stands.walk(0.1)
             stands.step(2)
 
+    def test_arms_go_where_they_are_sent_and_balance_is_kept(self):
+        env = poise.Environment("stand", robot="heron/heron", duration=60)
+        env.step(1000)
+        joint = {name: env.joint_names.index(name) for name in env.joint_names}
+        angles = {"left_shoulder_pitch": -0.8, "right_shoulder_pitch": -0.8, "left_elbow_pitch": -1.0, "waist_yaw": 0.4}
+        env.upper_body(angles, duration=1.0)
+        env.step(250)
+        half = env["GROUND_TRUTH"].joint_position[joint["waist_yaw"]]
+        self.assertTrue(0.1 < half < 0.3, half)  # the minimum-jerk line's middle is at 0.2
+        env.step(750)
+        for name, angle in angles.items():
+            self.assertAlmostEqual(env["GROUND_TRUTH"].joint_position[joint[name]], angle, delta=0.03, msg=name)
+        # A target each 0.02 s, as a teleoperator sends them: the arm follows it 0.1 s late.
+        for i in range(200):
+            env.upper_body({"left_elbow_pitch": -1.0 + 0.5 * np.sin(2 * np.pi * 0.5 * 0.02 * i)})
+            env.step(10)
+        phase = 2 * np.pi * 0.5 * (0.02 * 200 - 0.1)
+        self.assertAlmostEqual(env["GROUND_TRUTH"].joint_position[joint["left_elbow_pitch"]], -1.0 + 0.5 * np.sin(phase), delta=0.1)
+        self.assertFalse(env.failed, env.detail)
+        with self.assertRaisesRegex(poise.ConfigError, "move: this joint is a leg's"):
+            env.upper_body({"left_knee_pitch": 0.5})
+            env.step(2)
+        with self.assertRaisesRegex(poise.ConfigError, "outside the joint's range"):
+            env.upper_body({"waist_yaw": 9})
+            env.step(2)
+        with self.assertRaisesRegex(poise.ConfigError, "no joint 'elbow'; use one of"):
+            env.upper_body({"elbow": 0})
+
     def test_a_push_is_that_of_a_scenario(self):
         ticks, length, force = 100, 50, 70.0
         start = (ticks - 1) * 0.002  # tick i begins where tick i - 1 ended

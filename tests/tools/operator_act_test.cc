@@ -308,7 +308,8 @@ TEST(ControlDeskTest, TellsWhatBecameOfAnAct) {
   EXPECT_EQ(json["control"]["acts"][0]["tick"], 100);
   EXPECT_FALSE(desk.Take("12"));  // nothing has changed
   EXPECT_EQ(json["control"]["can"],
-            nlohmann::json({"push", "set", "step", "walk", "stop_walking", "stop", "reset"}));
+            nlohmann::json(
+                {"push", "set", "step", "walk", "stop_walking", "move", "stop", "reset"}));
   // What is beyond a page is refused before anybody receives it.
   const size_t sent = port.messages.size();
   ASSERT_TRUE(desk.Receive(

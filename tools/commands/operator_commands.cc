@@ -110,6 +110,31 @@ int DoAct(const ActedRun& run, const OperatorAct& act, const std::string& what) 
   return SayOutcome(run, run.port->Wait({act}).front(), what);
 }
 
+/// "NAME=NUMBER", each as an act of `kind`; `command` and `form` are what a message names.
+std::vector<OperatorAct> ActsOf(ActKind kind, const std::vector<std::string>& assignments,
+                                const std::string& command, const std::string& form) {
+  std::vector<OperatorAct> acts;
+  for (const std::string& assignment : assignments) {
+    const size_t equals = assignment.find('=');
+    if (equals == std::string::npos) {
+      throw ConfigError(fmt::format("{}: '{}' is no {}", command, assignment, form));
+    }
+    acts.push_back(ActOf(kind, assignment.substr(0, equals)));
+    acts.back().value = NumberOf(std::string_view(assignment).substr(equals + 1), acts.back().name);
+  }
+  return acts;
+}
+
+/// Sends them together, says what became of each; the exit code.
+int DoAssignments(const ActedRun& run, std::vector<OperatorAct> acts) {
+  int exit_code = kExitOk;
+  for (const OperatorAct& act : run.port->Wait(std::move(acts))) {
+    const int code = SayOutcome(run, act, fmt::format("{}={}", act.name, act.value));
+    if (code != kExitOk) exit_code = code;
+  }
+  return exit_code;
+}
+
 struct LiveSetOptions {
   std::string run;
   std::vector<std::string> assignments;
@@ -137,23 +162,22 @@ int SetLiveFields(const LiveSetOptions& options) {
   if (options.list == !options.assignments.empty()) {
     throw ConfigError("set: needs FIELD=VALUE, or --list");
   }
-  std::vector<OperatorAct> acts;
-  for (const std::string& assignment : options.assignments) {
-    const size_t equals = assignment.find('=');
-    if (equals == std::string::npos) {
-      throw ConfigError(fmt::format("set: '{}' is no FIELD=VALUE", assignment));
-    }
-    acts.push_back(ActOf(ActKind::kSet, assignment.substr(0, equals)));
-    acts.back().value = NumberOf(std::string_view(assignment).substr(equals + 1), acts.back().name);
-  }
+  std::vector<OperatorAct> acts = ActsOf(ActKind::kSet, options.assignments, "set", "FIELD=VALUE");
   const ActedRun run = FindActedRun(options.run, "poise set");
-  if (options.list) return ListLiveFields(run);
-  int exit_code = kExitOk;
-  for (const OperatorAct& act : run.port->Wait(std::move(acts))) {
-    const int code = SayOutcome(run, act, fmt::format("{}={}", act.name, act.value));
-    if (code != kExitOk) exit_code = code;
-  }
-  return exit_code;
+  return options.list ? ListLiveFields(run) : DoAssignments(run, std::move(acts));
+}
+
+struct MoveOptions {
+  std::string run;
+  std::vector<std::string> assignments;
+  double duration = 1;  // s
+};
+
+int MoveJoints(const MoveOptions& options) {
+  std::vector<OperatorAct> acts =
+      ActsOf(ActKind::kMove, options.assignments, "move", "JOINT=ANGLE");
+  for (OperatorAct& act : acts) act.duration = options.duration;
+  return DoAssignments(FindActedRun(options.run, "poise move"), std::move(acts));
 }
 
 struct RobotPushOptions {
@@ -252,6 +276,18 @@ void AddOperatorCommands(CLI::App* app, Command* command) {
                    : DoAct(acted, ActOf(ActKind::kStep, *foot), "step");
     };
   });
+
+  auto move_options = std::make_shared<MoveOptions>();
+  CLI::App* move = app->add_subcommand(
+      "move", "move arms, hands, head or waist in a run that goes on: joints that no leg needs");
+  move->add_option("assignment", move_options->assignments, "JOINT=ANGLE, in rad")->required();
+  move->add_option("--duration", move_options->duration,
+                   "s until they rest there; longer where a joint's limits ask for it")
+      ->capture_default_str();
+  move->add_option("--run", move_options->run, kWhichRun);
+  move->footer("Example: poise move left_elbow=0.5 right_elbow=0.5 --duration 0.5");
+  move->callback(
+      [move_options, command] { *command = [move_options] { return MoveJoints(*move_options); }; });
 
   auto walk_options = std::make_shared<RobotWalkOptions>();
   CLI::App* walk = app->add_subcommand("walk", "walk, in a run that goes on, or stop walking");

@@ -95,6 +95,10 @@ Json ControlDesk::Standing() const {
   Json json = {{"settings", std::move(settings)}, {"push_limit", push_limit_},
                {"push_longest", kLongestPush},    {"walk", {{"low", slow}, {"high", fast}}},
                {"can", std::move(can)},           {"stopped", port_->stopped()}};
+  json["movable"] = Json::array();
+  for (const MovableJoint& joint : port_->movable()) {
+    json["movable"].push_back({{"joint", joint.name}, {"low", joint.lower}, {"high", joint.upper}});
+  }
   if (const OperatorAct* const push = port_->push()) {
     json["push"] = {{"body", push->name},
                     {"force", {push->force.x(), push->force.y(), push->force.z()}}};

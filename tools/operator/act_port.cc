@@ -137,6 +137,10 @@ const ActPort::Targets& ActPort::targets() const {
       return !port.input && port.type == "support_plan_t";
     };
     if (std::ranges::any_of(type->ports, plans)) targets.planner = i;
+    const auto moves = [](const PortType& port) {
+      return !port.input && port.type == "task_torque_t";
+    };
+    if (std::ranges::any_of(type->ports, moves)) targets.tasks = i;
   }
   std::string robot, urdf;
   for (const Resource& resource : spec_.resource()) {
@@ -147,6 +151,15 @@ const ActPort::Targets& ActPort::targets() const {
   targets.weight = model.total_mass() * robot::kGravity;
   for (const auto& body : model.bodies()) targets.bodies.push_back(body.name);
   for (const auto& foot : model.feet()) targets.feet.push_back(foot.name);
+  std::vector<bool> leg(static_cast<size_t>(model.num_joints()), false);
+  for (const auto& foot : model.feet()) {
+    for (const int joint : model.supporting_joints(foot.body)) leg[static_cast<size_t>(joint)] = true;
+  }
+  for (const auto& joint : model.joints()) {
+    const size_t j = targets.joints.size();
+    targets.joints.push_back(joint.name);
+    if (!leg[j] && targets.tasks >= 0) targets.movable.push_back({joint.name, joint.lower, joint.upper});
+  }
   return targets_.emplace(std::move(targets));
 }
 
@@ -157,6 +170,10 @@ const LiveField& ActPort::Field(const std::string& path) const {
   for (const LiveField& field : fields()) names.push_back(field.path);
   throw ConfigError(fmt::format("{}: is no field that can be set while the run goes on; {}", path,
                                 Suggest(path, names)));
+}
+
+int64_t ActPort::TicksOf(double duration) const {
+  return std::max<int64_t>(1, std::llround(std::min(duration / spec_.tick_period(), 1e9)));
 }
 
 act_t ActPort::MessageOf(const OperatorAct& act) const {
@@ -179,10 +196,21 @@ act_t ActPort::MessageOf(const OperatorAct& act) const {
         message.force[i] = act.force[i];
         message.point[i] = act.point[i];
       }
-      const double ticks = std::min(act.duration / spec_.tick_period(), 1e9);
-      message.duration = act.duration < 0 ? -1 : std::max<int64_t>(1, std::llround(ticks));
+      message.duration = act.duration < 0 ? -1 : TicksOf(act.duration);
       return message;
     }
+    case ActKind::kMove:
+      if (targets().tasks < 0) {
+        throw ConfigError("move: this graph has no controller that takes an operator's acts");
+      }
+      if (!std::isfinite(act.value) || !(act.duration >= 0)) {
+        throw ConfigError("move: the angle must be a finite number, the duration 0 s or more");
+      }
+      message.component = targets().tasks;
+      message.body = IndexOf(targets().joints, act.name, "move: no joint");
+      message.value = act.value;
+      message.duration = TicksOf(act.duration);
+      return message;
     case ActKind::kSet:
     case ActKind::kAsk: {
       const LiveField& field = Field(act.name);

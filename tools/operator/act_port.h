@@ -25,6 +25,12 @@ struct LiveField {
   double value = 0;  ///< of the configuration; kAsk gives the present one
 };
 
+/// A joint that no leg needs, which kMove can send elsewhere.
+struct MovableJoint {
+  std::string name;
+  double lower = 0, upper = 0;  ///< rad
+};
+
 /// All live fields of a run's components, with their values at its start. Throws ConfigError.
 std::vector<LiveField> LiveFields(const RunSpec& spec);
 
@@ -37,7 +43,7 @@ class ActPort {
   ActPort& operator=(const ActPort&) = delete;
 
   /// Passes it on; its answer comes by TakeAnswers, and it is in force only when that says so.
-  /// Throws ConfigError on what no receiver could take: unknown body, field, foot; not finite; a
+  /// Throws ConfigError on what no receiver could take: unknown body, field, foot, joint; not finite; a
   /// graph without operator's channels; too many that wait.
   virtual void Do(OperatorAct act);
   /// Takes what has come and sends again what waits; waits up to `timeout_ms` for answers. Call it
@@ -58,6 +64,8 @@ class ActPort {
   /// Throws ConfigError, where the graph takes no acts too.
   const std::vector<LiveField>& fields() const;
   double weight() const { return targets().weight; }  ///< N, the robot's. Throws RobotError.
+  /// None where no controller takes acts. Throws RobotError.
+  const std::vector<MovableJoint>& movable() const { return targets().movable; }
 
  protected:
   /// An act without an answer.
@@ -98,13 +106,16 @@ class ActPort {
  private:
   /// To whom acts go, and the names that they may use, as act_t counts them.
   struct Targets {
-    int simulator = -1, planner = -1;  // indices in the graph; -1: nobody
-    std::vector<std::string> bodies, feet;
+    int simulator = -1, planner = -1, tasks = -1;  // indices in the graph; -1: nobody
+    std::vector<std::string> bodies, feet, joints;
+    std::vector<MovableJoint> movable;
     double weight = 0;  // N
   };
   void RequireActs() const;
   const Targets& targets() const;
   const LiveField& Field(const std::string& path) const;
+  /// At least 1.
+  int64_t TicksOf(double duration) const;
   operate::act_t MessageOf(const OperatorAct& act) const;
   std::string Reason(const OperatorAct& act, const operate::answer_t& answer) const;
 

@@ -29,10 +29,10 @@ struct Part {
       part;
 };
 constexpr Part kBody{"body", &OperatorAct::name}, kField{"field", &OperatorAct::name},
-    kFoot{"foot", &OperatorAct::name}, kForce{"force", &OperatorAct::force},
-    kPoint{"point", &OperatorAct::point}, kVelocity{"velocity", &OperatorAct::velocity},
-    kDuration{"duration", &OperatorAct::duration}, kValue{"value", &OperatorAct::value},
-    kTicks{"ticks", &OperatorAct::ticks};
+    kFoot{"foot", &OperatorAct::name}, kJoint{"joint", &OperatorAct::name},
+    kForce{"force", &OperatorAct::force}, kPoint{"point", &OperatorAct::point},
+    kVelocity{"velocity", &OperatorAct::velocity}, kDuration{"duration", &OperatorAct::duration},
+    kValue{"value", &OperatorAct::value}, kTicks{"ticks", &OperatorAct::ticks};
 
 /// All that tells one act from another, but for how it fills its message (ActPort).
 struct Form {
@@ -52,6 +52,7 @@ const std::vector<Form>& Forms() {
       {ActKind::kWalk, "walk", act_t::KIND_WALK, true, {kVelocity}},
       {ActKind::kStopWalking, "stop_walking", act_t::KIND_STAND, true, {}},
       {ActKind::kNextPhase, "next_phase", act_t::KIND_NEXT_PHASE, false, {}},
+      {ActKind::kMove, "move", act_t::KIND_JOINT, true, {kJoint, kValue, kDuration}},
       {ActKind::kStop, "stop", 0, true, {}},
       {ActKind::kReset, "reset", 0, true, {}},
       {ActKind::kPause, "pause", 0, true, {}},

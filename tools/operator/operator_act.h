@@ -20,6 +20,7 @@ struct OperatorAct {
     kWalk,         ///< velocity
     kStopWalking,  ///< stands side by side
     kNextPhase,    ///< ends the scenario's phase, whose moves are over
+    kMove,         ///< joint, value, duration
     kStop,         ///< emergency stop, latched
     kReset,        ///< ends a latched stop
     kPause,        ///< from here on of an interactive run alone
@@ -34,12 +35,12 @@ struct OperatorAct {
   Kind kind = Kind::kStop;
   int64_t client = 0;  ///< the sender's own number, and that of the act within it: they name it
   int64_t id = 0;
-  std::string name;                                    ///< body, field or foot
+  std::string name;                                    ///< body, field, foot or joint
   Eigen::Vector3d force = Eigen::Vector3d::Zero();     ///< N, world axes
   Eigen::Vector3d point = Eigen::Vector3d::Zero();     ///< m, body frame
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s forward and left, rad/s
   double duration = 0;  ///< s; below 0: until the next push of this body
-  double value = 0;     ///< of a field; of kSpeed, a factor
+  double value = 0;     ///< of a field; of kSpeed, a factor; of kMove, rad
   int64_t ticks = 0;
 
   State state = State::kSent;

@@ -9,6 +9,7 @@
 #include "components/framework/state_archive.h"
 #include "components/framework/tick_time.h"
 #include "components/messages/motion.h"
+#include "components/messages/quintic.h"
 #include "components/step_planner/stepping/step_choice.h"
 #include "components/step_planner/stepping/swing.h"
 

@@ -485,8 +485,8 @@ void QuasiStaticWalk::Archive(StateArchive* archive) {
   archive->Show(time_, since_, moving_since_, double_since_, touch_down_, standing_height_,
                 start_yaw_, starting_, final_, pressed_since_, course_.position, course_.yaw);
   archive->Show(unloaded_, lowered_);
-  archive->Show(foothold_.position, foothold_.yaw, wanted_, left_over_, reckoned_, offset_);
-  for (Quintic& quintic : start_) quintic.Archive(archive);
+  archive->Show(foothold_.position, foothold_.yaw, start_, wanted_, left_over_, reckoned_,
+                offset_);
   output_.Archive(archive);
 }
 

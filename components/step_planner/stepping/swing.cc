@@ -53,35 +53,6 @@ double CornerAcceleration(const Eigen::Vector2d& from, const Eigen::Vector2d& co
   return largest;
 }
 
-void Quintic::Begin(const Point& from, const Point& to, double start, double duration) {
-  const double t = duration, v0 = from.velocity * t, v1 = to.velocity * t;
-  const double a0 = from.acceleration * t * t, a1 = to.acceleration * t * t;
-  const double d = to.position - from.position;
-  coefficient_ = {from.position,
-                  v0,
-                  0.5 * a0,
-                  10 * d - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1,
-                  -15 * d + 8 * v0 + 7 * v1 + 1.5 * a0 - a1,
-                  6 * d - 3 * v0 - 3 * v1 - 0.5 * a0 + 0.5 * a1};
-  start_ = start;
-  duration_ = duration;
-}
-
-Quintic::Point Quintic::At(double time) const {
-  const auto& c = coefficient_;
-  const double late = std::max(0.0, time - start_ - duration_);
-  const double s = std::clamp((time - start_) / duration_, 0.0, 1.0);
-  Point point;
-  point.velocity =
-      (c[1] + s * (2 * c[2] + s * (3 * c[3] + s * (4 * c[4] + s * 5 * c[5])))) / duration_;
-  point.position =
-      c[0] + s * (c[1] + s * (c[2] + s * (c[3] + s * (c[4] + s * c[5])))) + late * point.velocity;
-  if (late > 0) return point;
-  point.acceleration =
-      (2 * c[2] + s * (6 * c[3] + s * (12 * c[4] + s * 20 * c[5]))) / (duration_ * duration_);
-  return point;
-}
-
 void Swing::Begin(const PointMotion& from, const Eigen::Matrix3d& rotation,
                   const Eigen::Vector3d& foothold, const Eigen::Matrix3d& level, double time,
                   double end, const SwingSpec& spec) {
@@ -200,13 +171,7 @@ RotationMotion Swing::RotationAt(double time) const {
 
 void Swing::Archive(StateArchive* archive) {
   archive->Show(spec_);
-  x_.Archive(archive);
-  y_.Archive(archive);
-  rise_.Archive(archive);
-  fall_.Archive(archive);
-  after_x_.Archive(archive);
-  after_y_.Archive(archive);
-  archive->Show(around_, from_, corner_, corner_time_);
+  archive->Show(x_, y_, rise_, fall_, after_x_, after_y_, around_, from_, corner_, corner_time_);
   archive->Show(foothold_, start_, apex_, end_, apex_height_, from_rotation_, turn_);
 }
 

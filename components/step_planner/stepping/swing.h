@@ -7,24 +7,9 @@
 
 #include "components/framework/state_archive.h"
 #include "components/messages/motion.h"
+#include "components/messages/quintic.h"
 
 namespace poise::stepping {
-
-/// Quintic in time between two motions of a coordinate; straight on with the last velocity after.
-class Quintic {
- public:
-  struct Point {
-    double position = 0, velocity = 0, acceleration = 0;
-  };
-  /// From `from` at `start` to `to` at start + duration, s, > 0.
-  void Begin(const Point& from, const Point& to, double start, double duration);
-  Point At(double time) const;
-  void Archive(StateArchive* archive) { archive->Show(coefficient_, start_, duration_); }
-
- private:
-  std::array<double, 6> coefficient_{};  // of powers of (time − start) / duration
-  double start_ = 0, duration_ = 1;
-};
 
 struct SwingSpec {
   double clearance = 0;    ///< m above the foothold; a foot that begins higher rises by `rise`

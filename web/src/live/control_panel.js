@@ -8,6 +8,7 @@ const STEPS = 200;  // of a slider
 const SPEEDS = [0.1, 0.2, 0.5, 1];
 const PUSH_SHARE = 0.2;     // of the largest force, first value of the push form
 const PUSH_DURATION = 0.2;  // s, likewise
+const MOVE_DURATION = 1;  // s, of the form that moves a joint
 const DIRECTIONS = {forward: [1, 0, 0], backward: [-1, 0, 0], left: [0, 1, 0], right: [0, -1, 0], up: [0, 0, 1]};
 const AXES = [['forward', 'm/s'], ['left', 'm/s'], ['turn', 'rad/s']];
 
@@ -87,6 +88,24 @@ function pushForm(control, robot) {
   }}, body, direction, force, 'N', duration, 's', element('button', {id: 'push'}, 'Push'));
 }
 
+/** Sends a joint that no leg needs to an angle. */
+function moveForm(control) {
+  const joints = control.standing.movable;
+  const joint = element('select', {'aria-label': 'Joint', change: () => show()}, ...joints.map((j) => element('option', {}, j.joint)));
+  const angle = element('input', {type: 'number', step: 'any', value: 0, 'aria-label': 'Angle, rad'});
+  const duration = element('input', {type: 'number', min: 0, step: 'any', value: MOVE_DURATION, 'aria-label': 'Duration, s'});
+  const show = () => {
+    const {low, high} = joints[joint.selectedIndex];
+    Object.assign(angle, {min: low, max: high, title: `${formatNumber(low)} to ${formatNumber(high)} rad`});
+    angle.value = Math.min(high, Math.max(low, Number(angle.value)));
+  };
+  show();
+  return element('form', {class: 'line', submit: (e) => {
+    e.preventDefault();
+    control.act('move', {joint: joint.value, value: Number(angle.value), duration: Number(duration.value)});
+  }}, joint, angle, 'rad', duration, 's', element('button', {id: 'move'}, 'Move'));
+}
+
 /** Pad, sliders and buttons of a walk, and single steps; what this run cannot do is grey, and says why. */
 function walking(control, run) {
   const {low, high} = control.standing.walk;
@@ -159,6 +178,7 @@ function pace(control, player, run) {
 function actText(act) {
   const what = {push: () => `push ${act.name}, ${formatNumber(Math.hypot(...act.force), 3)} N`, set: () => `${act.name} = ${formatNumber(act.value)}`,
     walk: () => `walk ${act.velocity.map((v) => formatNumber(v, 2)).join(', ')}`, step: () => `step, ${act.name}`,
+    move: () => `${act.name} to ${formatNumber(act.value)} rad`,
     tick: () => `${act.ticks} tick`, speed: () => `speed ${act.value}×`, back: () => `back to tick ${act.ticks}`}[act.do];
   const state = {unsent: `not sent: no connection${act.do === 'stop' ? '; it will be as soon as there is one' : ''}`, sent: 'sent, no answer yet', accepted: act.tick === undefined ? 'done' : `from tick ${act.tick}`, refused: `refused: ${act.reason}`}[act.state];
   return [what ? what() : act.do.replaceAll('_', ' '), state];
@@ -176,7 +196,7 @@ function answer(control, kinds) {
 
 /** All acts that are known of, the newest last; what could not be sent is one. */
 function actsOf({standing, unsent}) {
-  return [...standing.acts, ...(unsent ? [{...unsent, name: unsent.field ?? unsent.foot ?? unsent.body, state: 'unsent'}] : [])];
+  return [...standing.acts, ...(unsent ? [{...unsent, name: unsent.field ?? unsent.foot ?? unsent.joint ?? unsent.body, state: 'unsent'}] : [])];
 }
 
 /**
@@ -197,8 +217,9 @@ export function controlPanel(control, shared) {
     const tempo = control.can('pause') ? pace(control, player, run) : undefined;
     const walk = control.can('walk') ? walking(control, run) : undefined;
     const reset = control.can('reset') ? button('reset', 'End a stop, when the motors are at rest', () => control.act('reset'), {id: 'reset'}) : undefined;
-    const [paceAnswer, pushAnswer, walkAnswer, stopAnswer] = [['pause', 'go', 'tick', 'speed', 'back', 'restart'], ['push'],
-      ['walk', 'stop_walking', 'step'], ['stop', 'reset']].map((kinds) => answer(control, kinds));
+    const [paceAnswer, pushAnswer, walkAnswer, moveAnswer, stopAnswer] = [['pause', 'go', 'tick', 'speed', 'back', 'restart'],
+      ['push'], ['walk', 'stop_walking', 'step'], ['move'], ['stop', 'reset']].map((kinds) => answer(control, kinds));
+    const moving = control.can('move') && standing.movable?.length > 0 ? moveForm(control) : undefined;
     const pushing = control.can('push') ? pushForm(control, run.robot) : undefined;
     const lag = element('p', {class: 'answer lag', role: 'status'});
     const acts = element('ol', {class: 'acts', 'aria-live': 'polite'});
@@ -209,18 +230,19 @@ export function controlPanel(control, shared) {
     host.replaceChildren(...[element('h2', {}, 'Control'), lag,
       ...(tempo ? [tempo.element, paceAnswer.element] : []),
       ...(pushing ? [element('p', {class: 'soft'}, `Drag the robot to push it, up to ${formatNumber(standing.push_limit, 3)} N.`), pushing, pushAnswer.element] : []),
-      ...(walk ? [walk.element, walkAnswer.element] : []), acts]);
+      ...(moving ? [moving, moveAnswer.element] : []), ...(walk ? [walk.element, walkAnswer.element] : []), acts]);
     settings.replaceChildren(...(rows.length > 0 ? [element('details', {class: 'settings', open: true}, element('summary', {}, `${rows.length} settings`),
       element('div', {class: 'line'}, filter, undoButton), ...rows.map((row) => row.element))] : []));
     stopHost.replaceChildren(...[control.can('stop') ? button('EMERGENCY STOP', 'The bridge stops the robot (e)', () => control.act('stop'), {id: 'estop'}) : '',
       reset ?? '', stopAnswer.element].filter(Boolean));
     host.hidden = false;
     update = () => {
-      for (const part of [...rows, tempo, walk, paceAnswer, pushAnswer, walkAnswer, stopAnswer].filter(Boolean)) part.update();
+      for (const part of [...rows, tempo, walk, paceAnswer, pushAnswer, walkAnswer, moveAnswer, stopAnswer].filter(Boolean)) part.update();
       undoButton.disabled = !undo.next;
       undoButton.textContent = undo.next ? `undo ${undo.next.field}` : 'undo';
       if (reset) disable(reset, obstacle('reset', control, run));
       if (pushing) disable(pushing.querySelector('#push'), obstacle('push', control, run));
+      if (moving) disable(moving.querySelector('#move'), obstacle('move', control, run));
       acts.replaceChildren(...actsOf(control).slice(-6).reverse().map((act) => {
         const [what, state] = actText(act);
         return element('li', {class: act.state}, what, element('span', {class: 'text'}, ` ${state}`));
