@@ -23,10 +23,7 @@ int FindBody(const robot::RobotModel& model, const std::string& name, const std:
 double MeanOfPeak(Push::Profile profile) { return profile == Push::HALF_SINE ? 2 / pi : 1; }
 
 double ImpulseScale(const robot::RobotModel& model, const robot::RobotState& start) {
-  robot::RobotData data(model);
-  robot::ComputeKinematics(model, start, &data);
-  robot::ComputeFeet(model, &data);
-  robot::ComputeDynamics(model, start, &data);
+  const robot::RobotData data = robot::Evaluate(model, start);
   double ground = data.foot_pose[0].translation().z();
   for (const Eigen::Isometry3d& sole : data.foot_pose) {
     ground = std::min(ground, sole.translation().z());

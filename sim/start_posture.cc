@@ -39,13 +39,7 @@ RobotState SolveStart(const RobotModel& model, const StartPosture& config) {
   }
 
   RobotData data(model);
-  const auto evaluate = [&](const Eigen::VectorXd& joints) {
-    RobotState state(model.num_joints());
-    state.joint_position = joints;
-    robot::ComputeKinematics(model, state, &data);
-    robot::ComputeFeet(model, &data);
-    robot::ComputeDynamics(model, state, &data);
-  };
+  const auto evaluate = [&](const Eigen::VectorXd& joints) { data = Evaluate(model, joints); };
   double spacing = config.foot_spacing();
   if (!config.has_foot_spacing() && model.stance().foot_spacing) {
     spacing = *model.stance().foot_spacing;
@@ -80,10 +74,7 @@ RobotState SolveStart(const RobotModel& model, const StartPosture& config) {
 
 FootArray<Vector6d> RestWrenches(const RobotModel& model, const RobotState& state,
                                  const FootArray<bool>& in_contact) {
-  RobotData data(model);
-  robot::ComputeKinematics(model, state, &data);
-  robot::ComputeFeet(model, &data);
-  robot::ComputeDynamics(model, state, &data);
+  const RobotData data = Evaluate(model, state);
   const double arm = model.feet()[robot::Foot::kRight].length / 2;
   // Force and moment about the COM, world axes, of the wrenches [f; m / arm] in the sole frames.
   Eigen::Matrix<double, 6, 12> balance = Eigen::Matrix<double, 6, 12>::Zero();
@@ -110,10 +101,7 @@ FootArray<Vector6d> RestWrenches(const RobotModel& model, const RobotState& stat
 
 Eigen::VectorXd RestTorques(const RobotModel& model, const RobotState& state,
                             const FootArray<Vector6d>& wrenches) {
-  RobotData data(model);
-  robot::ComputeKinematics(model, state, &data);
-  robot::ComputeFeet(model, &data);
-  robot::ComputeDynamics(model, state, &data);
+  const RobotData data = Evaluate(model, state);
   Eigen::VectorXd force = data.gravity;
   for (const robot::Foot f : kFeet) {
     const Matrix3d r = data.foot_pose[f].linear();

@@ -42,12 +42,7 @@ AccelerationRange ViableAccelerations(const JointRange& range, double position, 
 }
 
 JointLimits::JointLimits(const robot::RobotModel& model, double horizon) : horizon_(horizon) {
-  robot::RobotData data(model);
-  robot::RobotState state(model.num_joints());
-  state.joint_position = model.stance().joint_position;
-  robot::ComputeKinematics(model, state, &data);
-  robot::ComputeFeet(model, &data);
-  robot::ComputeDynamics(model, state, &data);
+  const robot::RobotData data = robot::Evaluate(model, model.stance().joint_position);
   for (int j = 0; j < model.num_joints(); ++j) {
     const robot::Joint& joint = model.joints()[static_cast<size_t>(j)];
     const robot::MotorModel& motor = model.motors()[static_cast<size_t>(j)];

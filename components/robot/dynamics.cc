@@ -136,4 +136,18 @@ void InverseDynamics(const RobotModel& model, const RobotState& state, const Rob
   }
 }
 
+RobotData Evaluate(const RobotModel& model, const RobotState& state) {
+  RobotData data(model);
+  ComputeKinematics(model, state, &data);
+  ComputeFeet(model, &data);
+  ComputeDynamics(model, state, &data);
+  return data;
+}
+
+RobotData Evaluate(const RobotModel& model, const Eigen::VectorXd& joint_position) {
+  RobotState state(model.num_joints());
+  state.joint_position = joint_position;
+  return Evaluate(model, state);
+}
+
 }  // namespace poise::robot

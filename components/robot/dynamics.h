@@ -71,6 +71,11 @@ void ComputeFeet(const RobotModel& model, RobotData* data);
 /// Requires ComputeKinematics with the same state.
 void ComputeDynamics(const RobotModel& model, const RobotState& state, RobotData* data);
 
+/// All of the above of one state.
+RobotData Evaluate(const RobotModel& model, const RobotState& state);
+/// With the base at the origin, upright, everything at rest. `joint_position`: rad, n×1.
+RobotData Evaluate(const RobotModel& model, const Eigen::VectorXd& joint_position);
+
 /// Jacobian (6×n, linear over angular, world axes) of a point fixed to `body`; `point` in the body
 /// frame, m. Requires ComputeKinematics.
 void ComputePointJacobian(const RobotModel& model, const RobotData& data, int body,

@@ -232,12 +232,7 @@ RobotState SolvePosture(const RobotModel& model, const PostureGoal& goal) {
 
 double StandingHeight(const RobotModel& model) {
   if (model.stance().com_height) return *model.stance().com_height;
-  RobotState state(model.num_joints());
-  state.joint_position = model.stance().joint_position;
-  RobotData data(model);
-  ComputeKinematics(model, state, &data);
-  ComputeFeet(model, &data);
-  ComputeDynamics(model, state, &data);
+  const RobotData data = Evaluate(model, model.stance().joint_position);
   return data.com.z() - data.foot_pose[Foot::kRight].translation().z();
 }
 

@@ -30,12 +30,7 @@ SoftGround::SoftGround(const robot::RobotModel& model, double period)
       least_frequency_(kLeast * balance::PendulumFrequency(model)) {}
 
 double SoftGround::LegInertia(const robot::RobotModel& model, Foot foot) {
-  robot::RobotData data(model);
-  robot::RobotState state(model.num_joints());
-  state.joint_position = model.stance().joint_position;
-  robot::ComputeKinematics(model, state, &data);
-  robot::ComputeFeet(model, &data);
-  robot::ComputeDynamics(model, state, &data);
+  const robot::RobotData data = robot::Evaluate(model, model.stance().joint_position);
   const auto joints = model.supporting_joints(model.feet()[foot].body);
   const auto count = static_cast<Eigen::Index>(joints.size());
   Eigen::MatrixXd mass(count, count), jacobian(6, count);

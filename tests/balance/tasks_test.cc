@@ -15,10 +15,7 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 robot::RobotData Evaluate(const robot::RobotModel& model, const robot::RobotState& state) {
-  robot::RobotData data(model);
-  robot::ComputeKinematics(model, state, &data);
-  robot::ComputeFeet(model, &data);
-  robot::ComputeDynamics(model, state, &data);
+  const robot::RobotData data = robot::Evaluate(model, state);
   return data;
 }
 

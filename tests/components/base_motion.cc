@@ -36,10 +36,7 @@ robot::RobotState Stand(const robot::RobotModel& model) {
     if (has("hip_pitch") || has("ankle_pitch")) bent.joint_position[j] = -0.4;
     if (has("knee")) bent.joint_position[j] = 0.8;
   }
-  robot::RobotData data(model);
-  robot::ComputeKinematics(model, bent, &data);
-  robot::ComputeFeet(model, &data);
-  robot::ComputeDynamics(model, bent, &data);
+  const robot::RobotData data = robot::Evaluate(model, bent);
   const Vector3d right = data.foot_pose[0].translation(), left = data.foot_pose[1].translation();
   robot::PostureGoal goal;
   const double spacing = left.y() - right.y();

@@ -68,12 +68,4 @@ RobotState Moved(const RobotState& state, const Eigen::VectorXd& velocity, doubl
   return moved;
 }
 
-RobotData Evaluate(const RobotModel& model, const RobotState& state) {
-  RobotData data(model);
-  ComputeKinematics(model, state, &data);
-  ComputeFeet(model, &data);
-  ComputeDynamics(model, state, &data);
-  return data;
-}
-
 }  // namespace poise::robot

@@ -27,7 +27,4 @@ void SetVelocity(const Eigen::VectorXd& velocity, RobotState* state);
 /// The state moved for `time` along constant generalised velocity; its own velocity is kept.
 RobotState Moved(const RobotState& state, const Eigen::VectorXd& velocity, double time);
 
-/// All of RobotData.
-RobotData Evaluate(const RobotModel& model, const RobotState& state);
-
 }  // namespace poise::robot

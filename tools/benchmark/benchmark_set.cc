@@ -103,10 +103,7 @@ BenchmarkRobot ReadBenchmarkRobot(const std::string& name) {
   robot.maker_file = robot::MakerFile(description, robot.file);
   const robot::RobotModel model = robot::LoadRobotFiles(robot.file);
   const robot::RobotState start = SolveStart(model, StartPosture());
-  robot::RobotData data(model);
-  robot::ComputeKinematics(model, start, &data);
-  robot::ComputeFeet(model, &data);
-  robot::ComputeDynamics(model, start, &data);
+  const robot::RobotData data = robot::Evaluate(model, start);
   constexpr size_t kLeft = 1;
   const Eigen::Vector3d left = data.foot_pose[kLeft].translation();
   robot.mass = model.total_mass();

@@ -34,14 +34,6 @@ constexpr double kLongestReach = 1.5;  // m, that is tried
 constexpr double kAtLimit = 0.01;      // rad
 double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-robot::RobotData Evaluate(const RobotModel& model, const RobotState& state) {
-  robot::RobotData data(model);
-  robot::ComputeKinematics(model, state, &data);
-  robot::ComputeFeet(model, &data);
-  robot::ComputeDynamics(model, state, &data);
-  return data;
-}
-
 std::optional<RobotState> TrySolve(const RobotModel& model, const robot::PostureGoal& goal) {
   try {
     return robot::SolvePosture(model, goal);

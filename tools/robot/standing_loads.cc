@@ -27,10 +27,7 @@ Eigen::VectorXd HoldingTorque(const robot::RobotModel& model, const robot::Robot
 
 std::optional<robot::RobotState> OnOneFoot(const robot::RobotModel& model,
                                            const robot::RobotState& stance, size_t foot) {
-  robot::RobotData data(model);
-  robot::ComputeKinematics(model, stance, &data);
-  robot::ComputeFeet(model, &data);
-  robot::ComputeDynamics(model, stance, &data);
+  const robot::RobotData data = robot::Evaluate(model, stance);
   robot::PostureGoal goal;
   goal.foot = {data.foot_pose[0], data.foot_pose[1]};
   goal.com_xy = goal.foot[foot].translation().head<2>();

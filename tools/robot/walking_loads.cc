@@ -101,10 +101,7 @@ class Step {
   /// N·m, of the motors: of the whole acceleration, on the sole of `stance` alone, as far as that
   /// has room for its centre of pressure, and of friction.
   VectorXd Torque(const RobotState& state, const VectorXd& acceleration, robot::Foot stance) const {
-    robot::RobotData data(model_);
-    robot::ComputeKinematics(model_, state, &data);
-    robot::ComputeFeet(model_, &data);
-    robot::ComputeDynamics(model_, state, &data);
+    const robot::RobotData data = robot::Evaluate(model_, state);
     const VectorXd force = data.mass_matrix * acceleration + data.bias + data.gravity;
     const auto& jacobian = data.foot_jacobian[stance];
     robot::Vector6d wrench =

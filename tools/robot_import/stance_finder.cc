@@ -33,16 +33,6 @@ constexpr double kLeastGap = 0.04;  // m between the soles
 
 double Rounded(double value, double steps = kRounding) { return std::round(value * steps) / steps; }
 
-robot::RobotData Kinematics(const RobotModel& model, const Eigen::VectorXd& joints) {
-  robot::RobotState state(model.num_joints());
-  state.joint_position = joints;
-  robot::RobotData data(model);
-  robot::ComputeKinematics(model, state, &data);
-  robot::ComputeFeet(model, &data);
-  robot::ComputeDynamics(model, state, &data);
-  return data;
-}
-
 /// rad about y, from `a` to `b` in the sagittal plane.
 double PitchBetween(const Vector3d& a, const Vector3d& b) {
   return std::atan2(a.z() * b.x() - a.x() * b.z(), a.x() * b.x() + a.z() * b.z());
@@ -51,7 +41,7 @@ double PitchBetween(const Vector3d& a, const Vector3d& b) {
 void BendLeg(const RobotModel& model, const Anatomy& anatomy, robot::Foot foot, double bend,
              Eigen::VectorXd* joints) {
   const Leg& leg = anatomy.leg[foot];
-  const robot::RobotData data = Kinematics(model, *joints);
+  const robot::RobotData data = robot::Evaluate(model, *joints);
   struct Pitch {
     int joint;
     double sign;
@@ -101,7 +91,7 @@ FoundStance StanceAt(const RobotModel& model, const Anatomy& anatomy,
   for (const double bend : kBends) {
     robot::PostureGoal goal;
     goal.nominal = bend_knees ? WithBentKnees(model, anatomy, bend, nominal) : nominal;
-    const robot::RobotData data = Kinematics(model, goal.nominal);
+    const robot::RobotData data = robot::Evaluate(model, goal.nominal);
     goal.com_height = Rounded(data.com.z() - 0.5 * (data.foot_pose[0].translation().z() +
                                                     data.foot_pose[1].translation().z()));
     for (const robot::Foot f : robot::kFeet) {
@@ -162,7 +152,7 @@ Eigen::VectorXd WithBentKnees(const RobotModel& model, const Anatomy& anatomy, d
 
 FoundStance FindStance(const RobotModel& model, const Anatomy& anatomy,
                        const Eigen::VectorXd& nominal, bool bend_knees) {
-  const robot::RobotData zero = Kinematics(model, nominal);
+  const robot::RobotData zero = robot::Evaluate(model, nominal);
   const double spacing = Rounded(std::abs(zero.foot_pose[robot::Foot::kLeft].translation().y() -
                                           zero.foot_pose[robot::Foot::kRight].translation().y()));
   const FoundStance widest = StanceAt(model, anatomy, nominal, bend_knees, spacing);
