@@ -13,6 +13,14 @@
 
 namespace poise {
 
+class StateArchive;
+
+/// What shows its own state.
+template <class T>
+concept Archived = requires(T& value, StateArchive* archive) {
+  value.Archive(archive);
+};
+
 /// Walks over values and measures, saves or restores them, in the order shown. The structure (sizes
 /// of arrays) must be the same when saving and restoring; a restore into another structure, or with
 /// too few bytes, fails and leaves the rest untouched. Never allocates or throws.
@@ -28,9 +36,14 @@ class StateArchive {
     return {Mode::kRestore, const_cast<uint8_t*>(bytes.data()), bytes.size()};
   }
 
+  template <Archived T>
+  void Show(T& value) {
+    value.Archive(this);
+  }
   /// Values without pointers: numbers, enums, and structs of them.
   template <class T>
-  requires std::is_trivially_copyable_v<T> &&(!std::is_pointer_v<T>)void Show(T& value) {
+  requires std::is_trivially_copyable_v<T> &&
+      (!std::is_pointer_v<T>)&&(!Archived<T>)void Show(T& value) {
     Bytes(&value, sizeof value);
   }
   /// `values` has the same length when it is restored.

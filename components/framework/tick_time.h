@@ -31,14 +31,35 @@ class LastingCondition {
     holds_ = true;
     return time - since_ >= duration - kTimeTolerance;
   }
-  /// Whether it held in the last tick, and since when, s.
+  /// Whether it held in the last tick.
   bool holds() const { return holds_; }
-  double since() const { return since_; }
   void Archive(StateArchive* archive) { archive->Show(holds_, since_); }
 
  private:
   bool holds_ = false;
   double since_ = 0;
+};
+
+/// A condition with hysteresis in time: it changes once it has been contradicted for long enough,
+/// so that neither noise nor skipped ticks change it.
+class HeldCondition {
+ public:
+  /// `holds`: what holds until it has been contradicted.
+  void Reset(bool holds) {
+    holds_ = holds;
+    contradicted_.Reset();
+  }
+  /// Once a tick: what holds after `seen` in it; `duration`: s that a contradiction must last.
+  bool Update(double time, bool seen, double duration) {
+    if (contradicted_.Update(time, seen != holds_, duration)) Reset(!holds_);
+    return holds_;
+  }
+  bool holds() const { return holds_; }
+  void Archive(StateArchive* archive) { archive->Show(holds_, contradicted_); }
+
+ private:
+  bool holds_ = false;
+  LastingCondition contradicted_;
 };
 
 }  // namespace poise

@@ -34,14 +34,10 @@ class HipStrategy {
   explicit HipStrategy(const HipStrategyConfig& config) : config_(config) {}
 
   bool enabled() const { return config_.enabled(); }
-  double start() const { return config_.start(); }  ///< m
   /// The body's tilt as a rotation vector in the world, rad, and its derivatives in time.
   PointMotion Update(const HipInput& input);
   State state() const { return state_; }
-  void Archive(StateArchive* archive) {
-    archive->Show(state_, since_);
-    tilt_.Archive(archive);
-  }
+  void Archive(StateArchive* archive) { archive->Show(state_, since_, tilt_); }
 
  private:
   void Enter(State state, double time, const PointMotion& from, const Eigen::Vector3d& tilt,

@@ -75,10 +75,7 @@ Eigen::VectorXd HoldingShares(const robot::RobotModel& model, robot::Foot foot, 
   } catch (const robot::RobotError&) {
     return shares;
   }
-  robot::RobotData data(model);
-  robot::ComputeKinematics(model, state, &data);
-  robot::ComputeFeet(model, &data);
-  robot::ComputeDynamics(model, state, &data);
+  const robot::RobotData data = robot::Evaluate(model, state);
   const auto& jacobian = data.foot_jacobian[foot];
   const robot::Vector6d wrench =
       jacobian.leftCols<6>().transpose().partialPivLu().solve(data.gravity.head<6>());

@@ -63,12 +63,7 @@ constexpr double kWalkLowering = 0.06;
 /// m/s² that the hips' joints can give a sole with all their effort: of the leg's joints the two
 /// that swing it furthest, each with the inertia of all that it carries about its own axis.
 double SwingAcceleration(const robot::RobotModel& model) {
-  robot::RobotState state(model.num_joints());
-  state.joint_position = model.stance().joint_position;
-  robot::RobotData data(model);
-  robot::ComputeKinematics(model, state, &data);
-  robot::ComputeFeet(model, &data);
-  robot::ComputeDynamics(model, state, &data);
+  const robot::RobotData data = robot::Evaluate(model, model.stance().joint_position);
   double least = std::numeric_limits<double>::infinity();
   for (const robot::Foot f : robot::kFeet) {
     // By direction, ahead and sideways, the best joint.
@@ -92,12 +87,7 @@ double SwingAcceleration(const robot::RobotModel& model) {
 /// kg·m² about the COM, ahead and sideways the lesser, with which the body turns while soles and
 /// COM stay where they are.
 double TurningInertia(const robot::RobotModel& model) {
-  robot::RobotState state(model.num_joints());
-  state.joint_position = model.stance().joint_position;
-  robot::RobotData data(model);
-  robot::ComputeKinematics(model, state, &data);
-  robot::ComputeFeet(model, &data);
-  robot::ComputeDynamics(model, state, &data);
+  const robot::RobotData data = robot::Evaluate(model, model.stance().joint_position);
   std::vector<int> moving{0, 1, 2, 3, 4, 5};
   for (const robot::FootModel& foot : model.feet()) {
     for (const int j : model.supporting_joints(foot.body)) moving.push_back(6 + j);
@@ -140,6 +130,11 @@ void CheckRecoveryConfig(const RecoveryConfig& config) {
   // Between two heights a share of the way is taken.
   if (config.motion().has_com_lowering()) {
     CheckPositive(config.motion().com_lowering(), "recovery.motion.com_lowering");
+  }
+  if (config.motion().settle() > 0) {
+    throw ConfigError("recovery.motion.settle",
+                      "is given; the foot of a recovery is a contact from its first load on, since "
+                      "the capture point runs on: leave it out");
   }
 }
 
@@ -195,7 +190,6 @@ stepping::RecoverySpec MakeRecoverySpec(const RecoveryConfig& config,
   spec.swing = {motion.clearance(), kTouchSpeed, kFreeze};
   spec.touch_load = contact.touch_load();
   spec.observed_load = kObservedLoad * model.total_mass() * robot::kGravity;
-  spec.settle = motion.settle();
   spec.search_depth = contact.search_depth();
   spec.gain = motion.gain();
   spec.turn_share = TurningInertia(model) / (model.total_mass() * robot::kGravity);

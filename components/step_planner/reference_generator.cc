@@ -55,8 +55,7 @@ PointMotion ReferencePoint::Slow(double time, double period, double rate) {
 }
 
 void ReferencePoint::Archive(StateArchive* archive) {
-  move_.Archive(archive);
-  archive->Show(pending_, target_, start_, duration_);
+  archive->Show(move_, pending_, target_, start_, duration_);
 }
 
 void ReferenceTurn::Hold(const Eigen::Matrix3d& rotation) {
@@ -97,25 +96,13 @@ RotationMotion ReferenceTurn::At(double time) {
   return turn;
 }
 
-void ReferenceTurn::Archive(StateArchive* archive) {
-  archive->Show(origin_);
-  vector_.Archive(archive);
-}
+void ReferenceTurn::Archive(StateArchive* archive) { archive->Show(origin_, vector_); }
 
-void References::Archive(StateArchive* archive) {
-  com.Archive(archive);
-  body.Archive(archive);
-  for (PointMotion& motion : foot) motion.Archive(archive);
-  for (RotationMotion& motion : foot_rotation) motion.Archive(archive);
-}
+void References::Archive(StateArchive* archive) { archive->Show(com, body, foot, foot_rotation); }
 
 void ReferenceGenerator::Archive(StateArchive* archive) {
-  archive->Show(time_, anchored_, shifts_, foot_free_);
-  com_.Archive(archive);
-  for (ReferencePoint& foot : foot_) foot.Archive(archive);
-  body_turn_.Archive(archive);
-  for (ReferenceTurn& turn : foot_turn_) turn.Archive(archive);
-  references_.Archive(archive);
+  archive->Show(time_, anchored_, shifts_, foot_free_, com_, foot_, body_turn_, foot_turn_,
+                references_);
 }
 
 Eigen::Vector3d ReferenceGenerator::ComTarget(const ComReference& com,

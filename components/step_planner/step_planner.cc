@@ -38,10 +38,6 @@ constexpr double kFollowFrom = 0.005;
 // with them.
 constexpr double kSettleTime = 0.5;
 
-// A step is needed once the capture point has been 0.01 m beyond the soles for 0.1 s: of 145 pushes
-// that stood none raised this alarm, as the turning body brings a capture point back that is out
-// for a moment (docs/reference/balance.md).
-constexpr double kNeededExcess = 0.01, kNeededPersistence = 0.1;
 // rad, nearer than which no stance leg's joint may come to its limit while the body turns.
 constexpr double kJointReserve = 0.02;
 
@@ -60,7 +56,6 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   contact_ = config.contact();
   landing_ = robot::FootArray<Landing>(Landing(contact_));
   contact_loss_ = robot::FootArray<ContactLoss>(ContactLoss(contact_));
-  step_ = StepDetector(kNeededExcess, kNeededPersistence);
   strides_ = config.walk().enabled() && !config.walk().quasi_static();
   recovers_ = config.recovery().enabled() || strides_;
   if (recovers_) {
@@ -117,20 +112,10 @@ void StepPlanner::ConfigureLimits(const StepPlannerConfig& config) {
 }
 
 bool StepPlanner::Archive(StateArchive* archive) {
-  operator_.Archive(archive);
-  archive->Show(operator_walk_);
-  schedule_->Archive(archive);
-  generator_->Archive(archive);
-  stance_follower_.Archive(archive);
-  hip_strategy_->Archive(archive);
-  for (Landing& landing : landing_) landing.Archive(archive);
-  for (ContactLoss& loss : contact_loss_) loss.Archive(archive);
-  step_.Archive(archive);
-  references_.Archive(archive);
-  archive->Show(in_contact_, last_controlled_, owner_, untilted_, was_free_);
-  recovery_.Archive(archive);
-  walk_.Archive(archive);
-  footstep_report_.Archive(archive);
+  archive->Show(operator_, operator_walk_, *schedule_, *generator_, stance_follower_,
+                *hip_strategy_, references_, in_contact_, last_controlled_, owner_, untilted_,
+                was_free_, step_needed_, recovery_, walk_, footstep_report_);
+  for (const Foot f : kFeet) archive->Show(landing_[f], contact_loss_[f]);
   ArchiveMessage(&*support_plan_, archive);
   if (recovers_ || walks_) ArchiveMessage(&*footsteps_, archive);
   return true;
@@ -377,13 +362,14 @@ void StepPlanner::Report(double time, const Capture& capture) {
   const balance::ConvexPolygon soles =
       capture.known ? Soles(capture.frame_o, sole_) : balance::ConvexPolygon();
   if (soles.num_corners > 0) {
-    ReportCapture(time, capture.frame_o, soles, capture.pendulum, &step_, plan);
+    ReportCapture(time, capture.frame_o, soles, capture.pendulum, &step_needed_, plan);
   }
-  if (recovers_) ReportStepping(recovery_, time, estimate.sole, plan);
-  if (strides_) ReportCommand(recovery_.command(), plan);
-  if (walks_ && owner_ != FeetOwner::kRecovery) ReportWalking(walk_, time, estimate.sole, plan);
-  plan->num_steps = recovery_.num_steps() + walk_.num_begun();
   if (!recovers_ && !walks_) return;
+  const bool walking = walks_ && owner_ != FeetOwner::kRecovery;
+  ReportStepping(walking ? walk_.status(estimate.sole) : recovery_.status(),
+                 walking && walk_.active() ? walk_.command() : recovery_.command(), time,
+                 estimate.sole, plan);
+  plan->num_steps = recovery_.num_steps() + walk_.num_begun();
   const FootstepInput input{
       .time = time, .com_height = data.com.z(), .sole = estimate.sole, .in_contact = in_contact_};
   footstep_report_.Update(input, recovers_ ? &recovery_ : nullptr, walks_ ? &walk_ : nullptr,

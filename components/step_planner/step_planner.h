@@ -9,10 +9,10 @@
 #include "components/balance/whole_body.h"
 #include "components/framework/component.h"
 #include "components/framework/operator_acts.h"
+#include "components/framework/tick_time.h"
 #include "components/robot/robot_model.h"
 #include "components/step_planner/contact/contact_loss.h"
 #include "components/step_planner/contact/landing.h"
-#include "components/step_planner/contact/step_detector.h"
 #include "components/step_planner/footstep_report.h"
 #include "components/step_planner/hip_strategy.h"
 #include "components/step_planner/phase_schedule.h"
@@ -115,7 +115,7 @@ class StepPlanner : public Component, public Operated {
   ContactConfirmation contact_;
   robot::FootArray<Landing> landing_{Landing(contact_)};
   robot::FootArray<ContactLoss> contact_loss_{ContactLoss(contact_)};
-  StepDetector step_;
+  HeldCondition step_needed_;
   bool recovers_ = false;  // steps are made
   stepping::Recovery recovery_;
   bool walks_ = false;    // quasi-statically, where it is told to

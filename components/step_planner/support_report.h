@@ -5,9 +5,9 @@
 
 #include "components/balance/capture_point.h"
 #include "components/balance/convex_polygon.h"
+#include "components/framework/tick_time.h"
 #include "components/robot/dynamics.h"
 #include "components/step_planner/contact/landing.h"
-#include "components/step_planner/contact/step_detector.h"
 #include "components/step_planner/phase_schedule.h"
 #include "components/step_planner/reference_generator.h"
 #include "components/step_planner/stepping/footwork.h"
@@ -38,6 +38,6 @@ void ReportReferences(const SupportView& view, const robot::RobotData& data,
 /// Capture point and the step that it asks for; `soles` in `frame_o`, at least a corner.
 void ReportCapture(double time, const Eigen::Isometry3d& frame_o,
                    const balance::ConvexPolygon& soles, const balance::CapturePoint& pendulum,
-                   StepDetector* detector, support_plan_t* plan);
+                   HeldCondition* step_needed, support_plan_t* plan);
 
 }  // namespace poise

@@ -8,8 +8,6 @@ const char* StepReason(int8_t reason) {
       return "the capture point stays beyond the soles";
     case support_plan_t::REASON_SURE:
       return "the capture point is farther beyond the soles than balancing brings back";
-    case support_plan_t::REASON_DEADLINE:
-      return "later the foothold would be out of reach";
     case support_plan_t::REASON_LINGERING:
       return "the capture point lingers at the soles' edge and comes out";
     case support_plan_t::REASON_AGAIN:

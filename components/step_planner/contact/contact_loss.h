@@ -26,10 +26,7 @@ class ContactLoss {
     lost_ = false;
   }
   bool lost() const { return lost_; }
-  void Archive(StateArchive* archive) {
-    empty_.Archive(archive);
-    archive->Show(lost_);
-  }
+  void Archive(StateArchive* archive) { archive->Show(empty_, lost_); }
 
  private:
   double release_load_;     // N

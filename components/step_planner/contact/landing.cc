@@ -28,15 +28,9 @@ LoadLevels::LoadLevels(const ContactConfirmation& config, double deviation)
   if (deviation <= 0) press = config.press_load();
 }
 
-void TouchDetector::Reset(bool touching) {
-  touching_ = touching;
-  contradicts_.Reset();
-}
-
 bool TouchDetector::Update(double time, double load, const LoadLevels& levels) {
-  const bool contradicts = touching_ ? load < levels.release : load > levels.touch;
-  if (contradicts_.Update(time, contradicts, duration_)) Reset(!touching_);
-  return touching_;
+  const bool touches = touching() ? !(load < levels.release) : load > levels.touch;
+  return touching_.Update(time, touches, duration_);
 }
 
 void Landing::LiftOff(double z) {
@@ -175,12 +169,8 @@ bool Landing::Update(bool before_touch_down, bool due, const Eigen::Isometry3d& 
 }
 
 void Landing::Archive(StateArchive* archive) {
-  touch_.Archive(archive);
-  archive->Show(state_, time_, period_, load_, levels_, touched_, left_, lowered_, move_end_,
-                end_height_);
-  reference_.Archive(archive);
-  archive->Show(rotation_);
-  retreat_.Archive(archive);
+  archive->Show(touch_, state_, time_, period_, load_, levels_, touched_, left_, lowered_,
+                move_end_, end_height_, reference_, rotation_, retreat_);
 }
 
 }  // namespace poise

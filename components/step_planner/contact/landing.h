@@ -31,19 +31,15 @@ class TouchDetector {
   explicit TouchDetector(double duration = kTouchDuration) : duration_(duration) {}
 
   /// `touching`: what holds until the load says otherwise.
-  void Reset(bool touching);
+  void Reset(bool touching) { touching_.Reset(touching); }
   /// `time` in s, not decreasing; `load` in N, positive when the sole is pressed.
   bool Update(double time, double load, const LoadLevels& levels);
-  bool touching() const { return touching_; }
-  void Archive(StateArchive* archive) {
-    archive->Show(touching_);
-    contradicts_.Archive(archive);
-  }
+  bool touching() const { return touching_.holds(); }
+  void Archive(StateArchive* archive) { archive->Show(touching_); }
 
  private:
   double duration_;  // s
-  bool touching_ = false;
-  LastingCondition contradicts_;  // the load, `touching_`
+  HeldCondition touching_;
 };
 
 /// One foot from lift-off to double support. Pure function of its calls.

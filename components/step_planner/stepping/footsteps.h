@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 
+#include "components/framework/state_archive.h"
 #include "components/step_planner/stepping/feet.h"
 
 namespace poise::stepping {
@@ -14,12 +15,15 @@ struct WalkCommand {
   bool stepping = false;                               ///< walks, if only in place
 
   bool in_place() const { return velocity.isZero(0) && turn_rate == 0; }
+  void Archive(StateArchive* archive) { archive->Show(velocity, turn_rate, stepping); }
 };
 
 /// A level sole: its centre, m, and its heading, rad.
 struct Footstep {
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
   double yaw = 0;
+
+  void Archive(StateArchive* archive) { archive->Show(position, yaw); }
 };
 
 struct FootstepLimits {

@@ -13,11 +13,8 @@ constexpr double kLeastHeight = 0.1;  // m, of the COM above the ground: below, 
 }  // namespace
 
 void StepOutput::Archive(StateArchive* archive) {
-  archive->Show(in_contact, transition, progress, foot);
-  com.Archive(archive);
-  swing.Archive(archive);
-  swing_rotation.Archive(archive);
-  archive->Show(searching, cop, cop_reference);
+  archive->Show(in_contact, transition, progress, foot, com, swing, swing_rotation, searching, cop,
+                cop_reference);
 }
 
 double Yaw(const Eigen::Isometry3d& pose) {
@@ -51,6 +48,17 @@ void HeightLead::Follow(double wanted, double period) {
       rate_ * rate_ * (wanted - point_.position) - 2 * rate_ * point_.velocity, -most, most);
   point_.velocity += period * point_.acceleration;
   point_.position += period * point_.velocity;
+}
+
+void BodyHeading::Follow(double stance, double other, double period) {
+  const double heading = stance + 0.5 * std::remainder(other - stance, 2 * M_PI);
+  const double yaw = turned_.point().position;
+  turned_.Follow(yaw + std::remainder(heading - start_ - yaw, 2 * M_PI), period);
+}
+
+Foot FirstFoot(const WalkCommand& command) {
+  const double left = command.velocity.y() != 0 ? command.velocity.y() : command.turn_rate;
+  return left > 0 ? Foot::kLeft : Foot::kRight;
 }
 
 PointMotion LeadByCop(const StepInput& input, const Quintic::Point& height,

@@ -12,6 +12,7 @@
 #include "components/messages/quintic.h"
 #include "components/step_planner/stepping/step_choice.h"
 #include "components/step_planner/stepping/swing.h"
+#include "poise/support_plan_t.hpp"
 
 namespace poise::stepping {
 
@@ -34,6 +35,28 @@ struct StepInput {
   bool step_needed = false;  ///< the capture point has stayed beyond the soles
   bool allowed = true;       ///< a first step may begin
   WalkCommand command;       ///< of a planner that is told to walk
+};
+
+/// Why a step was made.
+enum class StepReason : int8_t {
+  kNone = support_plan_t::REASON_NONE,
+  kPersistent = support_plan_t::REASON_PERSISTENT,  ///< the capture point stayed beyond the soles
+  kSure = support_plan_t::REASON_SURE,  ///< so far beyond that nothing else can bring it back
+  kLingering = support_plan_t::REASON_LINGERING,  ///< at the edge for long, and coming out
+  kAgain = support_plan_t::REASON_AGAIN,          ///< the step before did not catch it
+  kWalk = support_plan_t::REASON_WALK,            ///< the robot walks
+  kTogether = support_plan_t::REASON_TOGETHER,    ///< the feet are put side by side
+};
+
+/// What a planner of steps says of itself.
+struct StepStatus {
+  int8_t stage = support_plan_t::STEPPING_NONE;        ///< STEPPING_*
+  StepReason reason = StepReason::kNone;               ///< of the step under way, or the last
+  Foot foot = Foot::kRight;                            ///< that steps, or last did
+  Eigen::Vector2d foothold = Eigen::Vector2d::Zero();  ///< m, world, of that step
+  double touch_down =
+      -1;             ///< s, planned, of the foot that is in the air or about to be; −1: none is
+  double margin = 0;  ///< StepPlan's
 };
 
 /// What the plan takes over while steps are made.
@@ -76,6 +99,31 @@ class HeightLead {
   double rate_;
   Quintic::Point point_;
 };
+
+/// The body's heading, led without haste to the middle of the soles' headings.
+class BodyHeading {
+ public:
+  /// `rate`, 1/s: HeightLead's.
+  explicit BodyHeading(double rate = 1) : turned_(rate) {}
+  /// The robot stands and heads along `yaw`, rad.
+  void Begin(double yaw) {
+    start_ = yaw;
+    turned_.Begin(0);
+  }
+  /// Once a tick of `period` s; rad, of the stance sole and of the other one, or of where that will
+  /// stand.
+  void Follow(double stance, double other, double period);
+  /// rad, rad/s, rad/s² about the vertical, since it stood.
+  const Quintic::Point& turned() const { return turned_.point(); }
+  void Archive(StateArchive* archive) { archive->Show(start_, turned_); }
+
+ private:
+  double start_ = 0;  // rad
+  HeightLead turned_;
+};
+
+/// The foot that steps first: of the side that the robot goes or turns to.
+Foot FirstFoot(const WalkCommand& command);
 
 /// Leads the COM by the centre of pressure `cop`, m, world, on the ground: in x and y it has the
 /// pendulum's acceleration (g + z̈)/(z − ground) (c − p), and neither position nor velocity to

@@ -39,15 +39,13 @@ constexpr double kOffsetRate = 5;
 constexpr double kSlowestSwing = 2.5;
 constexpr double kBlend = 0.1;  // s in which the centre of pressure goes over to another stage's
 
-double Difference(double yaw, double from) { return std::remainder(yaw - from, 2 * M_PI); }
-
 }  // namespace
 
 QuasiStaticWalk::QuasiStaticWalk(const StepChoice& choice, const QuasiStaticSpec& spec)
     : choice_(choice),
       spec_(spec),
       height_(spec.height_rate),
-      body_yaw_(spec.yaw_rate),
+      heading_(spec.yaw_rate),
       pressed_(spec.height_rate),
       sole_{PressedSole(choice.foot(Foot::kRight)), PressedSole(choice.foot(Foot::kLeft))},
       ramp_start_(RampStart(spec.press_share)) {}
@@ -146,9 +144,7 @@ void QuasiStaticWalk::Start(const StepInput& input, const StepState& state,
                       spec_.turn_acceleration * spec_.period());
   starting_ = true;
   final_ = false;
-  // The foot on the side that it goes or turns to steps first.
-  const double side = command.velocity.y() != 0 ? command.velocity.y() : command.turn_rate;
-  stance_ = side > 0 ? Foot::kRight : Foot::kLeft;
+  stance_ = Other(FirstFoot(command));
   in_contact_ = {true, true};
   sinks_ = {0, 0};
   for (const Foot foot : kFeet) sole_[foot].Touch(input.sole[foot]);
@@ -158,8 +154,7 @@ void QuasiStaticWalk::Start(const StepInput& input, const StepState& state,
   if (!lowered_) standing_height_ = input.com_height - ground;
   lowered_ = false;
   height_.Begin(input.com_height);
-  start_yaw_ = state.yaw;
-  body_yaw_.Begin(0);
+  heading_.Begin(state.yaw);
   course_ = {state.sole[stance_], state.sole_yaw[stance_]};
   foothold_ = Next(course_, Other(stance_));
   left_over_.setZero();
@@ -284,6 +279,21 @@ int QuasiStaticWalk::Planned(std::array<PlannedStep, kPlannedSteps>* steps) cons
   return count;
 }
 
+StepStatus QuasiStaticWalk::status(const FootArray<Eigen::Isometry3d>& sole) const {
+  constexpr std::array<int8_t, 7> kStages{
+      support_plan_t::STEPPING_NONE,      support_plan_t::STEPPING_UNLOADING,
+      support_plan_t::STEPPING_UNLOADING, support_plan_t::STEPPING_SWINGING,
+      support_plan_t::STEPPING_SWINGING,  support_plan_t::STEPPING_LOADING,
+      support_plan_t::STEPPING_CATCHING};
+  StepStatus status{.stage = kStages[static_cast<size_t>(stage_)], .reason = StepReason::kWalk};
+  const bool landed = stage_ == WalkStage::kLoading || stage_ == WalkStage::kStopping;
+  status.foot = landed ? stance_ : Other(stance_);
+  status.foothold =
+      landed ? Vector2d(sole[status.foot].translation().head<2>()) : foothold_.position;
+  if (stage_ == WalkStage::kSwinging) status.touch_down = touch_down_;
+  return status;
+}
+
 double QuasiStaticWalk::HighestForStep(const StepInput& input, const StepState& state) const {
   const bool steps = stage_ == WalkStage::kUnloading || OnOneFoot();
   if (!steps) return std::numeric_limits<double>::infinity();
@@ -315,13 +325,10 @@ void QuasiStaticWalk::Unload(const StepState& state, double period) {
 
 balance::ConvexPolygon QuasiStaticWalk::Carrying(const StepInput& input, const StepState& state,
                                                  const Vector2d& cop) const {
-  const double margin = choice_.limits().sole_margin;
   const Foot s = stance_, o = Other(s);
-  const balance::ConvexPolygon sole =
-      SoleAt(choice_.foot(stance_), margin, state.sole[s], state.sole_yaw[s]);
+  const balance::ConvexPolygon sole = choice_.Sole(state, s);
   if (OnOneFoot()) return sole;
-  const balance::ConvexPolygon other =
-      SoleAt(choice_.foot(Other(stance_)), margin, state.sole[o], state.sole_yaw[o]);
+  const balance::ConvexPolygon other = choice_.Sole(state, o);
   if (stage_ == WalkStage::kStarting || stage_ == WalkStage::kStopping) return HullOf(sole, other);
   // Free of the ramp the load goes to the feet as the centre of pressure lies between them.
   const Vector2d way = state.sole[s] - state.sole[o];
@@ -386,10 +393,7 @@ double QuasiStaticWalk::SwingTime() const {
 bool QuasiStaticWalk::Lost(const StepInput& input) const {
   if (!OnOneFoot()) return false;
   const StepState state = Observe(input, in_contact_);
-  const Foot s = stance_;
-  const balance::ConvexPolygon sole =
-      SoleAt(choice_.foot(stance_), 0, state.sole[s], state.sole_yaw[s]);
-  return -balance::SignedDistance(sole, state.pendulum.capture_point()) > 0;
+  return -balance::SignedDistance(choice_.Soles(state, 0), state.pendulum.capture_point()) > 0;
 }
 
 Vector2d QuasiStaticWalk::WithoutOffset(const StepState& state, const Vector2d& cop,
@@ -450,12 +454,8 @@ void QuasiStaticWalk::Lead(const StepInput& input, const StepState& state) {
   double height = Height(input, state);
   if (!spec_.ground.empty()) height = std::min(height, HighestForStep(input, state));
   height_.Follow(height, period);
-  // The body heads between the feet: where they stand, and where the one in the air will.
-  const bool swings = OnOneFoot();
-  const double other = swings ? foothold_.yaw : state.sole_yaw[Other(s)];
-  const double heading = state.sole_yaw[s] + 0.5 * Difference(other, state.sole_yaw[s]);
-  const double yaw = body_yaw_.point().position;
-  body_yaw_.Follow(yaw + Difference(heading - start_yaw_, yaw), period);
+  heading_.Follow(state.sole_yaw[s], OnOneFoot() ? foothold_.yaw : state.sole_yaw[Other(s)],
+                  period);
   const Vector2d cop = DesiredCop(input, state);
   output_.cop = cop;
   output_.cop_reference << WithoutOffset(state, cop, period), input.sole[s].translation().z();
@@ -473,21 +473,11 @@ void QuasiStaticWalk::Lead(const StepInput& input, const StepState& state) {
 }
 
 void QuasiStaticWalk::Archive(StateArchive* archive) {
-  archive->Show(stage_, command_.velocity, command_.turn_rate, command_.stepping, stance_,
-                num_steps_, in_contact_);
-  swing_.Archive(archive);
-  touch_.Archive(archive);
-  height_.Archive(archive);
-  body_yaw_.Archive(archive);
-  pressed_.Archive(archive);
-  for (PressedSole& sole : sole_) sole.Archive(archive);
-  archive->Show(sinks_, slower_, search_depth_);
-  archive->Show(time_, since_, moving_since_, double_since_, touch_down_, standing_height_,
-                start_yaw_, starting_, final_, pressed_since_, course_.position, course_.yaw);
-  archive->Show(unloaded_, lowered_);
-  archive->Show(foothold_.position, foothold_.yaw, start_, wanted_, left_over_, reckoned_,
-                offset_);
-  output_.Archive(archive);
+  archive->Show(stage_, command_, stance_, num_steps_, in_contact_, swing_, touch_, height_,
+                heading_, pressed_, sole_, sinks_, slower_, search_depth_, time_, since_,
+                moving_since_, double_since_, touch_down_, standing_height_, starting_, final_,
+                pressed_since_, course_, unloaded_, lowered_, foothold_, start_, wanted_,
+                left_over_, reckoned_, offset_, output_);
 }
 
 }  // namespace poise::stepping

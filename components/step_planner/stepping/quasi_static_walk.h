@@ -92,7 +92,8 @@ class QuasiStaticWalk {
     lowered_ = lowered_ || active();
     stage_ = WalkStage::kStanding;
   }
-  const Footstep& foothold() const { return foothold_; }  ///< of the step under way
+  /// `sole`: m, world; where a landed foot stands.
+  StepStatus status(const FootArray<Eigen::Isometry3d>& sole) const;
   struct PlannedStep {
     Footstep at;
     Foot foot = Foot::kRight;
@@ -107,7 +108,7 @@ class QuasiStaticWalk {
   /// What is walked now: the command, approached without haste.
   const WalkCommand& command() const { return command_; }
   /// rad, rad/s, rad/s² about the vertical, of the body since it stood.
-  const Quintic::Point& body_yaw() const { return body_yaw_.point(); }
+  const Quintic::Point& body_yaw() const { return heading_.turned(); }
   /// m, world: where the capture point shall be, before its error is fed back.
   const Eigen::Vector2d& wanted() const { return wanted_; }
   void Archive(StateArchive* archive);
@@ -179,7 +180,8 @@ class QuasiStaticWalk {
   FootArray<bool> in_contact_{true, true};
   Swing swing_;
   LastingCondition touch_;
-  HeightLead height_, body_yaw_;
+  HeightLead height_;
+  BodyHeading heading_;
   HeightLead pressed_;                              // share that the press carries
   double time_ = 0, since_ = 0, moving_since_ = 0;  // s: last tick; stage; not at rest
   double double_since_ = 0, touch_down_ = 0;        // s: both feet down; a touch, planned
@@ -192,7 +194,6 @@ class QuasiStaticWalk {
   double ramp_start_ = 0;          // of the loading ramp: what the press carries
   double standing_height_ = 0;     // m
   bool lowered_ = false;           // stopped while it walked: it has not stood up since
-  double start_yaw_ = 0;           // rad
   bool starting_ = false;          // no foot has left the ground yet
   bool final_ = false;             // no step follows the one that has landed
   Footstep foothold_;

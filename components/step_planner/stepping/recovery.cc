@@ -14,9 +14,6 @@ using Eigen::Vector3d;
 // m beyond the soles from which on neither ankles nor hips are trusted to bring the capture point
 // back. Fitted to what stands from both feet (docs/reference/steps.md).
 constexpr double kHopelessExcess = 0.015;
-// m inside the new soles that the best step must leave the capture point: waiting longer would
-// make it come late.
-constexpr double kLateMargin = 0.03;
 constexpr double kAgainAfter = 0.03;   // s beyond the soles of a step: longer than its touch
 constexpr double kNearEdgeTime = 0.1;  // s near the soles' edge: a push that stands is out sooner
 constexpr int kMostSteps = 12;         // in a row: an end to steps that catch nothing
@@ -44,23 +41,11 @@ constexpr double kTogetherShift = 1.5, kMostShifts = 2.5;
 constexpr double kTogetherRamp = 0.2, kTogetherSwing = 0.7;
 constexpr double kTogetherGain = 1;
 constexpr double kTogetherDistance = 0.03;  // m from side by side that is side by side
-// Time constant, as a share of the settling, with which a foot that touches is let go.
-constexpr double kLetGo = 0.25;
 
 }  // namespace
 
-balance::ConvexPolygon Recovery::Soles(const StepState& state, double margin) const {
-  balance::ConvexPolygon soles;
-  for (const Foot foot : kFeet) {
-    if (!state.in_contact[foot]) continue;
-    soles =
-        HullOf(soles, SoleAt(choice_.foot(foot), margin, state.sole[foot], state.sole_yaw[foot]));
-  }
-  return soles;
-}
-
 double Recovery::Excess(const StepState& state) const {
-  return -balance::SignedDistance(Soles(state, 0), state.pendulum.capture_point());
+  return -balance::SignedDistance(choice_.Soles(state, 0), state.pendulum.capture_point());
 }
 
 void Recovery::Watch(double time, double excess) {
@@ -106,8 +91,7 @@ bool Recovery::Update(const StepInput& input) {
       height_.Begin(input.com_height);
       steps_now_ = 0;
       in_contact_ = input.in_contact;
-      output_.cop = balance::NearestPoint(Soles(state, choice_.limits().sole_margin),
-                                          state.pendulum.capture_point());
+      output_.cop = balance::NearestPoint(choice_.Soles(state), state.pendulum.capture_point());
       BeginStep(input, choice_.Choose(state), need);
       break;
     }
@@ -174,11 +158,17 @@ StepReason Recovery::NeedOfFirstStep(const StepInput& input, const StepState& st
   }
   if (!(excess > 0)) return StepReason::kNone;
   if (input.step_needed) return StepReason::kPersistent;
-  if (excess > kHopelessExcess) return StepReason::kSure;
-  if (excess < kLeastExcess) return StepReason::kNone;
-  const StepPlan plan = choice_.Choose(state);
-  return plan.possible && plan.margin >= 0 && plan.margin < kLateMargin ? StepReason::kDeadline
-                                                                        : StepReason::kNone;
+  return excess > kHopelessExcess ? StepReason::kSure : StepReason::kNone;
+}
+
+StepStatus Recovery::status() const {
+  constexpr std::array<int8_t, 6> kStages{
+      support_plan_t::STEPPING_NONE,      support_plan_t::STEPPING_CATCHING,
+      support_plan_t::STEPPING_UNLOADING, support_plan_t::STEPPING_SWINGING,
+      support_plan_t::STEPPING_LOADING,   support_plan_t::STEPPING_CATCHING};
+  const bool under_way = stage_ == Stage::kUnloading || stage_ == Stage::kSwinging;
+  return {kStages[static_cast<size_t>(stage_)], reason_,     plan_.foot, plan_.foothold,
+          under_way ? touch_down_ : -1,         plan_.margin};
 }
 
 double Recovery::UnloadTime() const {
@@ -227,10 +217,7 @@ void Recovery::Shift(const StepInput& input, const StepState& state, double exce
     ShiftToStride(input, state, excess);
     return;
   }
-  const Foot stance = Other(plan_.foot);
-  const Foot s = stance;
-  const balance::ConvexPolygon sole =
-      SoleAt(choice_.foot(stance), choice_.limits().sole_margin, state.sole[s], state.sole_yaw[s]);
+  const balance::ConvexPolygon sole = choice_.Sole(state, Other(plan_.foot));
   const double over = input.time - since_;
   const bool above = over >= kTogetherShift - kTimeTolerance &&
                      balance::Contains(sole, state.pendulum.com) &&
@@ -246,8 +233,8 @@ void Recovery::Shift(const StepInput& input, const StepState& state, double exce
   }
 }
 
-void Recovery::BeginStep(const StepInput& input, const StepPlan& plan, StepReason reason) {
-  if (!plan.possible || !std::isfinite(plan.margin)) return;
+bool Recovery::BeginStep(const StepInput& input, const StepPlan& plan, StepReason reason) {
+  if (!plan.possible || !std::isfinite(plan.margin)) return false;
   plan_ = plan;
   reason_ = reason;
   ++num_steps_;
@@ -266,9 +253,10 @@ void Recovery::BeginStep(const StepInput& input, const StepPlan& plan, StepReaso
     stage_ = Stage::kSwinging;
     if (plan.around) swing_.GoAround(plan.corner);
   }
+  return true;
 }
 
-void Recovery::LiftOff(const StepInput& input) {
+bool Recovery::LiftOff(const StepInput& input) {
   const Foot foot = plan_.foot;
   in_contact_[foot] = false;
   const Eigen::Isometry3d& sole = input.sole[foot];
@@ -281,7 +269,7 @@ void Recovery::LiftOff(const StepInput& input) {
   stage_ = Stage::kSwinging;
   since_ = input.time;
   cop_from_ = output_.cop;
-  touched_since_ = -1;
+  return true;
 }
 
 double Recovery::TouchLoad(const StepInput& input) const {
@@ -289,23 +277,9 @@ double Recovery::TouchLoad(const StepInput& input) const {
   return std::max(spec_.touch_load, least > 0 ? std::max(least, spec_.observed_load) : 0);
 }
 
-bool Recovery::Touches(const StepInput& input) {
-  if (swing_.Progress(input.time) < kLeastProgress) return false;
-  if (touched_since_ < 0) {
-    // At once: the foot bounces, and six milliseconds of steady load came 0.12 s late.
-    if (!(input.load[plan_.foot] > TouchLoad(input))) return false;
-    touched_since_ = input.time;
-  }
-  return input.time >= touched_since_ + spec_.settle - kTimeTolerance;
-}
-
-void Recovery::Settle(const StepInput& input) {
-  const Foot foot = plan_.foot;
-  const double period = TickPeriod(input.time - time_);
-  const double share = period / (kLetGo * spec_.settle + period);
-  const double loaded = std::clamp(input.load[foot] / TouchLoad(input), 0.0, 1.0);
-  LetGo(input.sole[foot], share, loaded, period * (1 - loaded) * spec_.swing.touch_speed,
-        swing_.foothold().z() - spec_.search_depth, &output_);
+bool Recovery::Touches(const StepInput& input) const {
+  // The first load counts: the foot bounces, and six milliseconds of steady load came 0.12 s late.
+  return swing_.Progress(input.time) >= kLeastProgress && input.load[plan_.foot] > TouchLoad(input);
 }
 
 void Recovery::Land(const StepInput& input) {
@@ -326,28 +300,18 @@ bool Recovery::StepOn(const StepInput& input, const StepState& state) {
   if (command_.stepping) {
     StepReason reason = StepReason::kWalk;
     const StepPlan next = WalkOn(state, other, 0, &reason);
-    if (!next.possible) return false;
-    BeginStep(input, next, reason);
-    LiftOff(input);
-    return true;
+    return BeginStep(input, next, reason) && LiftOff(input);
   }
-  const double margin = balance::SignedDistance(Soles(state, choice_.limits().sole_margin),
-                                                state.pendulum.capture_point());
+  const double margin =
+      balance::SignedDistance(choice_.Soles(state), state.pendulum.capture_point());
   if (margin > kStepOnShare * choice_.limits().ample_margin) return false;
   const StepPlan next = choice_.Next(state, other);
-  if (!next.possible) return false;
-  BeginStep(input, next, StepReason::kAgain);
-  LiftOff(input);
-  return true;
+  return BeginStep(input, next, StepReason::kAgain) && LiftOff(input);
 }
 
 void Recovery::Swings(const StepInput& input, const StepState& state) {
   output_.searching = false;
   if (stage_ != Stage::kUnloading && stage_ != Stage::kSwinging) return;
-  if (stage_ == Stage::kSwinging && touched_since_ >= 0) {
-    Settle(input);
-    return;
-  }
   // A push takes over a foot that is under way to the other's side.
   if (reason_ == StepReason::kTogether) {
     if (!(Excess(state) > kLeastExcess)) {
@@ -414,15 +378,10 @@ Vector2d Recovery::PointFor(const StepInput& input, const StepState& state,
 
 Vector2d Recovery::BrakingPoint(const StepInput& input, const StepState& state) const {
   const Foot stance = Other(plan_.foot);
-  const Foot s = stance;
+  const balance::ConvexPolygon sole = choice_.Sole(state, stance);
   if (reason_ == StepReason::kTogether) {
-    return PointFor(input, state,
-                    SoleAt(choice_.foot(stance), choice_.limits().sole_margin, state.sole[s],
-                           state.sole_yaw[s]),
-                    state.sole[s], Vector2d::Zero(), kSwingBudget);
+    return PointFor(input, state, sole, state.sole[stance], Vector2d::Zero(), kSwingBudget);
   }
-  const balance::ConvexPolygon sole =
-      SoleAt(choice_.foot(stance), choice_.limits().sole_margin, state.sole[s], state.sole_yaw[s]);
   if (reason_ == StepReason::kWalk) {
     return WalkingPoint(input, state, stance, sole,
                         touch_down_ + gait(state).transfer - input.time);
@@ -435,8 +394,7 @@ Vector2d Recovery::CatchingPoint(const StepInput& input, const StepState& state)
   Vector2d goal = Goal(state), velocity = Vector2d::Zero();
   const bool walks = command_.stepping && reason_ == StepReason::kWalk;
   if (walks && stage_ != Stage::kShifting) {
-    return WalkingPoint(input, state, plan_.foot, Soles(state, choice_.limits().sole_margin),
-                        gait(state).period);
+    return WalkingPoint(input, state, plan_.foot, choice_.Soles(state), gait(state).period);
   }
   if (stage_ == Stage::kShifting && walks) {
     const Vector2d way = choice_.StrideBegin(state, Other(plan_.foot), gait(state)) - shift_from_;
@@ -449,8 +407,7 @@ Vector2d Recovery::CatchingPoint(const StepInput& input, const StepState& state)
     goal = shift_from_ + shift.position * way;
     velocity = shift.speed * way;
   }
-  return PointFor(input, state, Soles(state, choice_.limits().sole_margin), goal, velocity,
-                  kCatchBudget);
+  return PointFor(input, state, choice_.Soles(state), goal, velocity, kCatchBudget);
 }
 
 bool Recovery::AtRest(const StepInput& input, const StepState& state) {
@@ -522,21 +479,11 @@ void Recovery::LeadCom(const StepInput& input, const StepState& state) {
 }
 
 void Recovery::Archive(StateArchive* archive) {
-  archive->Show(stage_, reason_, num_steps_, steps_now_, in_contact_);
-  archive->Show(plan_.possible, plan_.foot, plan_.time, plan_.foothold, plan_.yaw, plan_.cop,
-                plan_.capture_point, plan_.com, plan_.margin, plan_.missed, plan_.moved,
-                plan_.place, plan_.around, plan_.corner);
-  swing_.Archive(archive);
-  height_.Archive(archive);
-  outside_.Archive(archive);
-  near_edge_.Archive(archive);
-  archive->Show(time_, since_, ramp_from_, touched_since_, touch_down_, stays_outside_,
+  archive->Show(stage_, reason_, num_steps_, steps_now_, in_contact_, plan_, swing_, height_,
+                outside_, near_edge_, time_, since_, ramp_from_, touch_down_, stays_outside_,
                 stays_near_edge_, excess_at_edge_, moving_since_, cop_from_, standing_height_,
-                together_asked_, together_at_, shift_from_, step_helps_);
-  archive->Show(command_.velocity, command_.turn_rate, command_.stepping, start_yaw_, turns_);
-  body_yaw_.Archive(archive);
-  stride_.Archive(archive);
-  output_.Archive(archive);
+                together_asked_, together_at_, shift_from_, step_helps_, command_, turns_, heading_,
+                stride_, output_);
 }
 
 }  // namespace poise::stepping

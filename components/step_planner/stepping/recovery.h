@@ -19,7 +19,6 @@ struct RecoverySpec {
   SwingSpec swing;
   double touch_load = 0;     ///< N
   double observed_load = 0;  ///< N, in place of `touch_load` where loads are observed
-  double settle = 0;         ///< s from a touch until the foot is a contact of the model
   double search_depth = 0;   ///< m below the foothold
   double gain = 0;           ///< of the capture point's error in the centre of pressure, > 0
   /// m·s²: the inertia with which the body turns, soles and COM at rest, over the robot's weight.
@@ -40,24 +39,13 @@ struct RecoverySpec {
 };
 
 enum class Stage { kIdle, kShifting, kUnloading, kSwinging, kLoading, kCatching };
-/// Why a step was made.
-enum class StepReason {
-  kNone,
-  kPersistent,  ///< the capture point stayed beyond the soles
-  kSure,        ///< so far beyond that nothing else can bring it back
-  kDeadline,    ///< waiting longer would leave the reach
-  kLingering,   ///< at the edge for long, and coming out
-  kAgain,       ///< the step before did not catch it
-  kWalk,        ///< the robot walks
-  kTogether,    ///< the feet are put side by side
-};
 
 /// Pure function of its calls; never allocates.
 class Recovery {
  public:
   Recovery() = default;
   Recovery(const StepChoice& choice, const RecoverySpec& spec)
-      : choice_(choice), spec_(spec), height_(spec.height_rate), body_yaw_(spec.yaw_rate) {}
+      : choice_(choice), spec_(spec), height_(spec.height_rate), heading_(spec.yaw_rate) {}
 
   /// Once a tick. False: idle, `output` is not to be used.
   bool Update(const StepInput& input);
@@ -70,7 +58,8 @@ class Recovery {
   bool would_step() const { return active() || step_helps_; }
   Stage stage() const { return stage_; }
   StepReason reason() const { return reason_; }
-  int num_steps() const { return num_steps_; }       ///< since the start
+  int num_steps() const { return num_steps_; }  ///< since the start
+  StepStatus status() const;
   const StepPlan& plan() const { return plan_; }     ///< of the step under way
   double touch_down() const { return touch_down_; }  ///< s, planned, of the step under way
   const StepChoice& choice() const { return choice_; }
@@ -79,28 +68,25 @@ class Recovery {
   /// The body heads where the feet do: it has walked since it last stood.
   bool turns() const { return turns_; }
   /// rad, rad/s, rad/s² about the vertical, of the body since it stood.
-  const Quintic::Point& body_yaw() const { return body_yaw_.point(); }
+  const Quintic::Point& body_yaw() const { return heading_.turned(); }
   void Archive(StateArchive* archive);
 
  private:
-  /// Hull of the soles in contact, `margin` m off their edges.
-  balance::ConvexPolygon Soles(const StepState& state, double margin) const;
   /// m that the capture point is beyond the soles in contact; negative inside.
   double Excess(const StepState& state) const;
   /// Keeps the times of what has to last. `excess`: m.
   void Watch(double time, double excess);
   StepReason NeedOfFirstStep(const StepInput& input, const StepState& state, double excess);
-  /// No effect without a foot.
-  void BeginStep(const StepInput& input, const StepPlan& plan, StepReason reason);
-  void LiftOff(const StepInput& input);
+  /// False, and no effect: no foot can make this step.
+  bool BeginStep(const StepInput& input, const StepPlan& plan, StepReason reason);
+  /// True: the plan's foot has left the ground.
+  bool LiftOff(const StepInput& input);
   /// The foothold where the capture point now says, and the foot on its way there.
   void Swings(const StepInput& input, const StepState& state);
-  /// The foot that swings has met the ground.
-  bool Touches(const StepInput& input);
+  /// The foot that swings has met the ground, and is a contact of the model from now on.
+  bool Touches(const StepInput& input) const;
   /// N on it that are a touch.
   double TouchLoad(const StepInput& input) const;
-  /// It stands on the ground, and is not a contact of the model yet.
-  void Settle(const StepInput& input);
   void Land(const StepInput& input);
   /// The other foot leaves as soon as the one that has landed carries more, until the capture point
   /// is well inside the soles. True: it does.
@@ -150,8 +136,8 @@ class Recovery {
 
   // s in which a walk that begins brings the capture point to where its first step starts.
   static constexpr double kSetOff = 0.5;
-  // Capture points this far beyond the soles, m, step as soon as the best step would leave less
-  // than kLateMargin (recovery.cc), m, inside the new ones: noise makes no step.
+  // m beyond the soles from which on a capture point asks for a step that is under way already, or
+  // about to be: it is no noise.
   static constexpr double kLeastExcess = 0.02;
   // m of centre of pressure, at most, for the return of the body to upright while a foot swings.
   static constexpr double kSwingBudget = 0.02;
@@ -167,7 +153,6 @@ class Recovery {
   double time_ = 0, since_ = 0;  // s, last tick; when the stage began
   double ramp_from_ = 0;         // share of the unloading ramp where `cop_from_` was asked for
   double touch_down_ = 0;        // s
-  double touched_since_ = -1;    // s; negative: not yet, in this swing
   // The capture point is beyond the soles, and near their edge or beyond.
   LastingCondition outside_, near_edge_;
   bool stays_outside_ = false, stays_near_edge_ = false;  // for as long as a step asks for
@@ -182,8 +167,7 @@ class Recovery {
   HeightLead height_;           // m, world, of the COM's reference
   WalkCommand command_;
   StrideCorrection stride_;
-  HeightLead body_yaw_;   // rad, since it stood
-  double start_yaw_ = 0;  // rad
+  BodyHeading heading_;
   bool turns_ = false;
   StepOutput output_;
 };

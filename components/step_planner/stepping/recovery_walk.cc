@@ -13,7 +13,6 @@ constexpr double kMostMissed = 0.05;
 // Share of the standing height by which a push must have moved a walk's foothold for the step to
 // tell nothing of undisturbed ones.
 constexpr double kMoved = 0.08;
-constexpr double kTurnShare = 0.5;  // of the way between the soles' headings that the body takes
 
 }  // namespace
 
@@ -42,10 +41,8 @@ Vector2d Recovery::WalkingPoint(const StepInput& input, const StepState& state, 
 }
 
 void Recovery::SetOff(const StepInput& input, const StepState& state) {
-  // The foot of the side that it goes to is the first.
-  const double out = command_.velocity.y() != 0 ? command_.velocity.y() : command_.turn_rate;
   plan_ = StepPlan();
-  plan_.foot = out > 0 ? Foot::kLeft : Foot::kRight;
+  plan_.foot = FirstFoot(command_);
   reason_ = StepReason::kWalk;
   BeginShift(input, state);
   BeginTurning(state);
@@ -55,19 +52,14 @@ void Recovery::BeginTurning(const StepState& state) {
   if (turns_) return;
   turns_ = true;
   stride_.Forget();
-  start_yaw_ = state.yaw;
-  body_yaw_.Begin(0);
+  heading_.Begin(state.yaw);
 }
 
 void Recovery::TurnBody(const StepState& state, double period) {
   if (!turns_) return;
   const bool steps = stage_ == Stage::kUnloading || stage_ == Stage::kSwinging;
-  const Foot s = Other(plan_.foot);
-  const double other = steps ? plan_.yaw : state.sole_yaw[plan_.foot];
-  const double heading =
-      state.sole_yaw[s] + kTurnShare * std::remainder(other - state.sole_yaw[s], 2 * M_PI);
-  const double yaw = body_yaw_.point().position;
-  body_yaw_.Follow(yaw + std::remainder(heading - start_yaw_ - yaw, 2 * M_PI), period);
+  heading_.Follow(state.sole_yaw[Other(plan_.foot)], steps ? plan_.yaw : state.sole_yaw[plan_.foot],
+                  period);
 }
 
 void Recovery::ShiftToStride(const StepInput& input, const StepState& state, double excess) {

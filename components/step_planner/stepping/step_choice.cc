@@ -49,15 +49,26 @@ bool IsFree(const Vector2d& from, const Vector2d& to, const Vector2d& half) {
 
 }  // namespace
 
+void StepPlan::Archive(StateArchive* archive) {
+  archive->Show(possible, foot, time, foothold, yaw, cop, capture_point, com, margin, follows,
+                missed, moved, place, around, corner);
+}
+
 double SwingTime(double distance, double acceleration) {
   return std::sqrt(kQuinticAcceleration * distance / acceleration);
 }
 
 Vector2d StepChoice::BrakingPoint(const StepState& state, Foot stance) const {
-  const Foot i = stance;
-  return balance::NearestPoint(
-      SoleAt(feet_[i], limits_.sole_margin, state.sole[i], state.sole_yaw[i]),
-      state.pendulum.capture_point());
+  return balance::NearestPoint(Sole(state, stance), state.pendulum.capture_point());
+}
+
+balance::ConvexPolygon StepChoice::Soles(const StepState& state, double margin) const {
+  balance::ConvexPolygon soles;
+  for (const Foot i : kFeet) {
+    if (!state.in_contact[i]) continue;
+    soles = HullOf(soles, SoleAt(feet_[i], margin, state.sole[i], state.sole_yaw[i]));
+  }
+  return soles;
 }
 
 double StepChoice::DistanceOfLegs(Foot foot, const Vector2d& foothold, const Vector2d& com) const {
@@ -176,8 +187,7 @@ void StepChoice::PutDown(const StepState& state, const Vector2d& wanted, StepPla
   plan->missed = (foothold - wanted).norm();
   plan->foothold = state.sole[s] + turn * foothold;
   const balance::ConvexPolygon soles =
-      HullOf(SoleAt(feet_[s], limits_.sole_margin, state.sole[s], state.sole_yaw[s]),
-             SoleAt(feet_[foot], limits_.sole_margin, plan->foothold, plan->yaw));
+      HullOf(Sole(state, s), SoleAt(feet_[foot], limits_.sole_margin, plan->foothold, plan->yaw));
   plan->margin = balance::SignedDistance(soles, plan->capture_point);
   // A COM that the stance leg cannot follow is as bad as a capture point outside.
   plan->margin = std::min(plan->margin, plan->margin + plan->follows);
@@ -213,8 +223,7 @@ StepPlan StepChoice::StrideAt(const StepState& state, Foot foot, const Gait& gai
   const Foot s = Other(foot);
   const auto stride = NominalStride({state.sole[s], state.sole_yaw[s]}, foot, gait.command,
                                     gait.period, state.pendulum.frequency, StrideLimits());
-  const balance::ConvexPolygon sole =
-      SoleAt(feet_[s], limits_.sole_margin, state.sole[s], state.sole_yaw[s]);
+  const balance::ConvexPolygon sole = Sole(state, s);
   const double carries = time + gait.transfer;
   StepPlan plan = Until(state, foot, carries, StridePoint(state, s, gait, carries, sole));
   plan.time = time;
@@ -293,11 +302,7 @@ bool StepChoice::Helps(const StepState& state, const StepPlan& plan) const {
   if (plan.margin >= 0) return true;
   // The stance sole would leave the ground before the foot comes down.
   if (plan.follows < 0) return false;
-  balance::ConvexPolygon soles;
-  for (const Foot i : kFeet) {
-    if (!state.in_contact[i]) continue;
-    soles = HullOf(soles, SoleAt(feet_[i], limits_.sole_margin, state.sole[i], state.sole_yaw[i]));
-  }
+  const balance::ConvexPolygon soles = Soles(state);
   const Vector2d now = state.pendulum.capture_point();
   const Vector2d stays = CapturePointAfter(now, balance::NearestPoint(soles, now),
                                            state.pendulum.frequency, plan.time);

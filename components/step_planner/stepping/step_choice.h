@@ -5,6 +5,7 @@
 #include <array>
 
 #include "components/balance/convex_polygon.h"
+#include "components/framework/state_archive.h"
 #include "components/robot/robot_model.h"
 #include "components/step_planner/stepping/footsteps.h"
 #include "components/step_planner/stepping/legs.h"
@@ -57,6 +58,8 @@ struct StepPlan {
   Place place = Place::kBeside;
   bool around = false;  ///< the way goes around the stance leg, by `corner`, m
   Eigen::Vector2d corner = Eigen::Vector2d::Zero();
+
+  void Archive(StateArchive* archive);
 };
 
 /// A walk that a step is part of.
@@ -112,6 +115,15 @@ class StepChoice {
   /// The step catches the capture point, or comes nearer to it than the soles where they are while
   /// the stance leg follows the COM.
   bool Helps(const StepState& state, const StepPlan& plan) const;
+  /// The sole of `foot`, `sole_margin` off its edges.
+  balance::ConvexPolygon Sole(const StepState& state, Foot foot) const {
+    return SoleAt(feet_[foot], limits_.sole_margin, state.sole[foot], state.sole_yaw[foot]);
+  }
+  /// Hull of the soles in contact, `margin`, m, off their edges, or `sole_margin`.
+  balance::ConvexPolygon Soles(const StepState& state, double margin) const;
+  balance::ConvexPolygon Soles(const StepState& state) const {
+    return Soles(state, limits_.sole_margin);
+  }
   /// The stance sole's point nearest to the capture point, less `sole_margin`.
   Eigen::Vector2d BrakingPoint(const StepState& state, Foot stance) const;
   const StepLimits& limits() const { return limits_; }

@@ -20,6 +20,19 @@ constexpr double kCornerPower = 0.6;  // of the pieces' lengths, as which their 
 constexpr int kSamples = 8;           // of a piece's acceleration
 constexpr double kLeastPiece = 1e-3;  // m
 
+void Begin(const Horizontal& from, const Horizontal& to, double start, double duration,
+           std::array<Quintic, 2>* way) {
+  for (size_t i = 0; i < way->size(); ++i) (*way)[i].Begin(from[i], to[i], start, duration);
+}
+
+Horizontal At(const std::array<Quintic, 2>& way, double time) {
+  return {way[0].At(time), way[1].At(time)};
+}
+
+Horizontal AtCorner(const Eigen::Vector2d& corner, const Eigen::Vector2d& velocity) {
+  return {Quintic::Point{corner.x(), velocity.x()}, {corner.y(), velocity.y()}};
+}
+
 }  // namespace
 
 Passing PassCorner(const Eigen::Vector2d& from, const Eigen::Vector2d& corner,
@@ -35,19 +48,18 @@ Passing PassCorner(const Eigen::Vector2d& from, const Eigen::Vector2d& corner,
 double CornerAcceleration(const Eigen::Vector2d& from, const Eigen::Vector2d& corner,
                           const Eigen::Vector2d& to) {
   const Passing passing = PassCorner(from, corner, to);
+  const auto at_rest = [](const Eigen::Vector2d& point) {
+    return Horizontal{Quintic::Point{point.x()}, {point.y()}};
+  };
+  const Horizontal turn = AtCorner(corner, passing.velocity);
   double largest = 0;
   for (const bool after : {false, true}) {
     std::array<Quintic, 2> way;
     const double duration = after ? 1 - passing.share : passing.share;
-    for (int i = 0; i < 2; ++i) {
-      const Quintic::Point turn{corner[i], passing.velocity[i]};
-      way[static_cast<size_t>(i)].Begin(after ? turn : Quintic::Point{from[i]},
-                                        after ? Quintic::Point{to[i]} : turn, 0, duration);
-    }
+    Begin(after ? turn : at_rest(from), after ? at_rest(to) : turn, 0, duration, &way);
     for (int k = 0; k <= kSamples; ++k) {
-      const double time = duration * k / kSamples;
-      largest =
-          std::max(largest, std::hypot(way[0].At(time).acceleration, way[1].At(time).acceleration));
+      const Horizontal at = At(way, duration * k / kSamples);
+      largest = std::max(largest, std::hypot(at[0].acceleration, at[1].acceleration));
     }
   }
   return largest;
@@ -66,9 +78,11 @@ void Swing::Begin(const PointMotion& from, const Eigen::Matrix3d& rotation,
     return Quintic::Point{from.position[i], from.velocity[i], from.acceleration[i]};
   };
   const double wait = spec.wait * (end_ - start_);
-  const double duration = (spec.across < 1 ? Across(start_) : end_ - start_) - wait;
-  x_.Begin(point(0), {foothold.x()}, start_ + wait, duration);
-  y_.Begin(point(1), {foothold.y()}, start_ + wait, duration);
+  const double above = start_ + spec.across * (end_ - start_);  // s, the foothold
+  const double duration =
+      spec.across < 1 ? std::max(above - start_, std::max(spec.freeze, kLeastTime)) : end_ - start_;
+  stepping::Begin({point(0), point(1)}, {Quintic::Point{foothold.x()}, {foothold.y()}},
+                  start_ + wait, duration - wait, &way_);
   apex_height_ = std::max(foothold.z() + spec.clearance, from.position.z() + spec.rise);
   rise_.Begin(point(2), {apex_height_}, start_, apex_ - start_);
   fall_.Begin({apex_height_}, {foothold.z(), -spec.touch_speed}, apex_, end_ - apex_);
@@ -80,48 +94,39 @@ void Swing::Begin(const PointMotion& from, const Eigen::Matrix3d& rotation,
 void Swing::GoAround(const Eigen::Vector2d& corner) {
   around_ = true;
   corner_ = corner;
-  const Quintic::Point x = x_.At(start_), y = y_.At(start_);
-  from_ = {x.position, y.position};
+  const Horizontal from = stepping::At(way_, start_);
+  from_ = {from[0].position, from[1].position};
   corner_time_ = end_;
-  Turn(x, y, start_);
+  Turn(from, start_);
 }
 
-void Swing::Turn(const Quintic::Point& x, const Quintic::Point& y, double time) {
+void Swing::Turn(const Horizontal& from, double time) {
   const Passing passing = PassCorner(from_, corner_, foothold_.head<2>());
   const double whole = end_ - start_;
-  const std::array<Quintic::Point, 2> turn{
-      Quintic::Point{corner_.x(), passing.velocity.x() / whole},
-      Quintic::Point{corner_.y(), passing.velocity.y() / whole}};
+  const Horizontal turn = AtCorner(corner_, passing.velocity / whole);
   // The first bound, should rounding leave the second below it.
   corner_time_ = std::max(
       time + kLeastTime,
       std::min(start_ + passing.share * whole, std::max(end_, time + 2 * kLeastTime) - kLeastTime));
-  x_.Begin(x, turn[0], time, corner_time_ - time);
-  y_.Begin(y, turn[1], time, corner_time_ - time);
-  const double left = std::max(end_ - corner_time_, kLeastTime);
-  after_x_.Begin(turn[0], {foothold_.x()}, corner_time_, left);
-  after_y_.Begin(turn[1], {foothold_.y()}, corner_time_, left);
+  stepping::Begin(from, turn, time, corner_time_ - time, &way_);
+  stepping::Begin(turn, {Quintic::Point{foothold_.x()}, {foothold_.y()}}, corner_time_,
+                  std::max(end_ - corner_time_, kLeastTime), &after_);
 }
 
 void Swing::Move(const Eigen::Vector2d& foothold, double time, double end) {
   if (frozen(time)) return;
   end = std::max(end, time + std::max(spec_.freeze, kLeastTime));
+  const bool past = Past(time), before = around_ && !past;
   // So near to the corner the pieces stay; a tick or some later the last one moves.
-  if (around_ && time < corner_time_ && time > corner_time_ - 2 * kLeastTime) return;
-  const bool before = around_ && time < corner_time_;
-  const bool after = around_ && !before;
-  const Quintic::Point x = (after ? after_x_ : x_).At(time), y = (after ? after_y_ : y_).At(time);
+  if (before && time > corner_time_ - 2 * kLeastTime) return;
   foothold_.head<2>() = foothold;
-  // It goes on rising straight up for as long as it was to.
-  const double from = std::max(time, start_ + spec_.wait * (end_ - start_));
-  double duration = (spec_.across < 1 ? Across(time) : end - time) - (from - time);
-  if (from > time) duration = std::max(duration, kLeastTime);
+  std::array<Quintic, 2>& piece = past ? after_ : way_;
+  const Horizontal now = stepping::At(piece, time);
   if (!before) {
-    (after ? after_x_ : x_).Begin(x, {foothold.x()}, from, duration);
-    (after ? after_y_ : y_).Begin(y, {foothold.y()}, from, duration);
+    stepping::Begin(now, {Quintic::Point{foothold.x()}, {foothold.y()}}, time, end - time, &piece);
   }
   MoveEnd(time, end);
-  if (before) Turn(x, y, time);
+  if (before) Turn(now, time);
 }
 
 void Swing::MoveEnd(double time, double end) {
@@ -137,18 +142,12 @@ void Swing::MoveEnd(double time, double end) {
   end_ = end;
 }
 
-double Swing::Across(double time) const {
-  return std::max(start_ + spec_.across * (end_ - start_) - time,
-                  std::max(spec_.freeze, kLeastTime));
-}
-
 double Swing::Progress(double time) const {
   return std::clamp((time - start_) / (end_ - start_), 0.0, 1.0);
 }
 
 PointMotion Swing::At(double time) const {
-  const bool after = around_ && time >= corner_time_;
-  const Quintic::Point x = (after ? after_x_ : x_).At(time), y = (after ? after_y_ : y_).At(time);
+  const auto [x, y] = stepping::At(Past(time) ? after_ : way_, time);
   const Quintic::Point z = time < apex_ ? rise_.At(time) : fall_.At(time);
   return {{x.position, y.position, z.position},
           {x.velocity, y.velocity, z.velocity},
@@ -171,7 +170,7 @@ RotationMotion Swing::RotationAt(double time) const {
 
 void Swing::Archive(StateArchive* archive) {
   archive->Show(spec_);
-  archive->Show(x_, y_, rise_, fall_, after_x_, after_y_, around_, from_, corner_, corner_time_);
+  archive->Show(way_, after_, rise_, fall_, around_, from_, corner_, corner_time_);
   archive->Show(foothold_, start_, apex_, end_, apex_height_, from_rotation_, turn_);
 }
 

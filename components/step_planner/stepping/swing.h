@@ -31,6 +31,9 @@ Passing PassCorner(const Eigen::Vector2d& from, const Eigen::Vector2d& corner,
 double CornerAcceleration(const Eigen::Vector2d& from, const Eigen::Vector2d& corner,
                           const Eigen::Vector2d& to);
 
+/// The motions of x and y.
+using Horizontal = std::array<Quintic::Point, 2>;
+
 /// Sole centre and turn of a foot from lift-off to the ground. The way is continuous in position,
 /// velocity and acceleration whatever the foothold does: each new one begins from the motion so
 /// far. After `end` it goes on downward with touch_speed, for the ground is not where it was
@@ -44,12 +47,12 @@ class Swing {
              const SwingSpec& spec);
   /// Right after Begin: by way of `corner`, m, world, in x and y, where `across` is 1.
   void GoAround(const Eigen::Vector2d& corner);
-  /// Another foothold, in x and y, and time; no effect within `freeze` of the end.
+  /// Another foothold, in x and y, and time; no effect within `freeze` of the end. Of a swing
+  /// without `wait` and `across`.
   void Move(const Eigen::Vector2d& foothold, double time, double end);
   PointMotion At(double time) const;
   RotationMotion RotationAt(double time) const;
   bool around() const { return around_; }
-  double start() const { return start_; }
   double end() const { return end_; }
   /// Share of the time that has passed, 0 to 1.
   double Progress(double time) const;
@@ -59,18 +62,19 @@ class Swing {
 
  private:
   void MoveEnd(double time, double end);
-  /// Both pieces, the first from a motion at `time`.
-  void Turn(const Quintic::Point& x, const Quintic::Point& y, double time);
+  /// Both pieces of a way around a corner, the first from the motion `from` at `time`.
+  void Turn(const Horizontal& from, double time);
+  /// Whether the corner lies behind.
+  bool Past(double time) const { return around_ && time >= corner_time_; }
 
   SwingSpec spec_;
-  Quintic x_, y_, rise_, fall_;
+  std::array<Quintic, 2> way_;  // x and y, up to the corner where there is one
+  std::array<Quintic, 2> after_;
+  Quintic rise_, fall_;
   bool around_ = false;
-  Quintic after_x_, after_y_;                                                          // the corner
   Eigen::Vector2d from_ = Eigen::Vector2d::Zero(), corner_ = Eigen::Vector2d::Zero();  // m
   double corner_time_ = 0;                                                             // s
   Eigen::Vector3d foothold_ = Eigen::Vector3d::Zero();
-  /// s until it is above the foothold.
-  double Across(double time) const;
 
   double start_ = 0, apex_ = 0, end_ = 0;  // s
   double apex_height_ = 0;                 // m

@@ -297,21 +297,6 @@ TEST_P(RecoveryCase, NoFootIsSentFartherThanLegsReachHoweverHardThePush) {
   EXPECT_GT(steps, 10);
 }
 
-// A foot that is let go is a contact so much later, and nothing else changes until then.
-TEST_P(RecoveryCase, AFootThatSettlesIsAContactLater) {
-  std::array<double, 2> landed{};
-  for (size_t i = 0; i < 2; ++i) {
-    RecoverySpec spec = Shipped(GetParam());
-    spec.settle = i == 0 ? 0 : 0.04;
-    World world(GetParam(), 0, spec);
-    world.Push({1.1 * world.mass() * world.Frequency() * EdgeDistance(world, {1, 0}, 0), 0});
-    EXPECT_TRUE(world.Run(4));
-    landed[i] = world.touched();
-  }
-  EXPECT_GT(landed[0], 0);
-  EXPECT_NEAR(landed[1] - landed[0], 0.04, 1.5 * kPeriod);
-}
-
 TEST_P(RecoveryCase, WhatTheSolesCanStopGetsNoStep) {
   for (double degrees = 0; degrees < 360; degrees += 30) {
     World world(GetParam(), 0, degrees < 180 ? Shipped(GetParam()) : Lingering(GetParam(), 0.006));

