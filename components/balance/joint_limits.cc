@@ -41,15 +41,21 @@ AccelerationRange ViableAccelerations(const JointRange& range, double position, 
   return result;
 }
 
+PositionRange::PositionRange(const robot::Joint& joint) {
+  const double reserve = std::min(JointLimits::kPositionReserve, 0.1 * (joint.upper - joint.lower));
+  lower = joint.lower + reserve;
+  upper = joint.upper - reserve;
+}
+
 JointLimits::JointLimits(const robot::RobotModel& model, double horizon) : horizon_(horizon) {
   const robot::RobotData data = robot::Evaluate(model, model.stance().joint_position);
   for (int j = 0; j < model.num_joints(); ++j) {
     const robot::Joint& joint = model.joints()[static_cast<size_t>(j)];
     const robot::MotorModel& motor = model.motors()[static_cast<size_t>(j)];
+    const PositionRange positions(joint);
     JointRange range;
-    const double reserve = std::min(kPositionReserve, 0.1 * (joint.upper - joint.lower));
-    range.lower = joint.lower + reserve;
-    range.upper = joint.upper - reserve;
+    range.lower = positions.lower;
+    range.upper = positions.upper;
     range.velocity = joint.velocity_limit > 0 ? kVelocityShare * joint.velocity_limit
                                               : std::numeric_limits<double>::max();
     const double torque = std::min(joint.effort, motor.torque_per_ampere() * motor.peak_current);

@@ -30,6 +30,12 @@ struct AccelerationRange {
 AccelerationRange ViableAccelerations(const JointRange& range, double position, double velocity,
                                       double horizon);
 
+/// rad: a joint's positions less the reserve that control keeps off their ends.
+struct PositionRange {
+  explicit PositionRange(const robot::Joint& joint);
+  double lower, upper;
+};
+
 /// The ranges of a robot's joints. A share of what the URDF gives is kept in reserve: what the
 /// velocity filter and the drive lag behind. The acceleration is that of half the joint's torque
 /// limit against its own inertia in the stance, at most kHardest.
@@ -57,7 +63,7 @@ class JointLimits {
     return a.lower > -most || a.upper < most;
   }
 
-  static constexpr double kPositionReserve = 0.02;  ///< rad
+  static constexpr double kPositionReserve = 0.02;  ///< rad, or a tenth of a joint's range
   static constexpr double kVelocityShare = 0.8;     ///< of the URDF's velocity limit
   static constexpr double kTorqueShare = 0.5;       ///< of the joint's torque limit
   static constexpr double kHardest = 60;            ///< rad/s²

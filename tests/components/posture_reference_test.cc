@@ -15,15 +15,15 @@ namespace {
 
 using operate::answer_t;
 
-constexpr double kPeriod = 0.002;  // s
+constexpr double kTickPeriod = 0.002;  // s
 constexpr int kLeg = 0;
 
 class PostureReferenceTest : public testing::Test {
  protected:
-  PostureReferenceTest() : limits_(model_, kPeriod) {
+  PostureReferenceTest() : limits_(model_, kTickPeriod) {
     std::vector<char> leg(static_cast<size_t>(model_.num_joints()), 0);
     leg[kLeg] = 1;
-    posture_.emplace(limits_, leg, kPeriod);
+    posture_.emplace(limits_, leg, kTickPeriod);
     posture_->Hold(Eigen::VectorXd::Zero(model_.num_joints()));
   }
 
@@ -32,7 +32,7 @@ class PostureReferenceTest : public testing::Test {
     act.kind = operate::act_t::KIND_JOINT;
     act.body = joint;
     act.value = angle;
-    act.duration = std::llround(duration / kPeriod);
+    act.duration = std::llround(duration / kTickPeriod);
     return posture_->Move(act, time);
   }
 
@@ -64,10 +64,10 @@ TEST_F(PostureReferenceTest, AMoveThatIsTooFastTakesAsLongAsTheLimitsAsk) {
     ASSERT_EQ(Move(j, range.upper, 0, 0), answer_t::VERDICT_DONE);
     double speed = 0, acceleration = 0, end = 0;
     for (int tick = 0; tick < 30000; ++tick) {
-      posture_->Update(tick * kPeriod);
+      posture_->Update(tick * kTickPeriod);
       speed = std::max(speed, std::abs(posture_->velocity()[j]));
       acceleration = std::max(acceleration, std::abs(posture_->acceleration()[j]));
-      if (posture_->position()[j] < range.upper) end = tick * kPeriod;
+      if (posture_->position()[j] < range.upper - 1e-9) end = tick * kTickPeriod;
     }
     // Its greatest speed and acceleration are looked for at 15 points: 1 % is missed at most.
     EXPECT_LE(speed, 1.01 * range.velocity) << j;
@@ -76,7 +76,7 @@ TEST_F(PostureReferenceTest, AMoveThatIsTooFastTakesAsLongAsTheLimitsAsk) {
     const double least =
         std::max(1.875 * range.upper / range.velocity,
                  std::sqrt(10 / std::sqrt(3.0) * range.upper / range.acceleration));
-    EXPECT_LE(end, 1.11 * least + 2 * kPeriod) << j;
+    EXPECT_LE(end, 1.11 * least + 2 * kTickPeriod) << j;
   }
 }
 
@@ -84,7 +84,7 @@ TEST_F(PostureReferenceTest, TargetsAtAnyRateMakeNoStepOfPositionVelocityOrAccel
   const int arm = model_.num_joints() - 1;
   const balance::JointRange& range = limits_.range(arm);
   double last_velocity = 0, last_position = 0, time = 0;
-  for (int tick = 0; tick < 5000; ++tick, time = tick * kPeriod) {
+  for (int tick = 0; tick < 5000; ++tick, time = tick * kTickPeriod) {
     if (tick % 7 == 3) {
       const double angle =
           0.6 * range.upper * std::sin(2 * time) + 0.1 * range.upper * std::sin(31 * time);
@@ -92,8 +92,8 @@ TEST_F(PostureReferenceTest, TargetsAtAnyRateMakeNoStepOfPositionVelocityOrAccel
     }
     posture_->Update(time);
     const double velocity = posture_->velocity()[arm], position = posture_->position()[arm];
-    EXPECT_LE(std::abs(position - last_position), 1.1 * range.velocity * kPeriod);
-    EXPECT_LE(std::abs(velocity - last_velocity), 1.1 * range.acceleration * kPeriod);
+    EXPECT_LE(std::abs(position - last_position), 1.1 * range.velocity * kTickPeriod);
+    EXPECT_LE(std::abs(velocity - last_velocity), 1.1 * range.acceleration * kTickPeriod);
     last_velocity = velocity;
     last_position = position;
   }

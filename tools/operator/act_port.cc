@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "components/balance/joint_limits.h"
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_reference.h"
 #include "components/framework/configuration/suggest.h"
@@ -153,12 +154,15 @@ const ActPort::Targets& ActPort::targets() const {
   for (const auto& foot : model.feet()) targets.feet.push_back(foot.name);
   std::vector<bool> leg(static_cast<size_t>(model.num_joints()), false);
   for (const auto& foot : model.feet()) {
-    for (const int joint : model.supporting_joints(foot.body)) leg[static_cast<size_t>(joint)] = true;
+    for (const int joint : model.supporting_joints(foot.body))
+      leg[static_cast<size_t>(joint)] = true;
   }
   for (const auto& joint : model.joints()) {
-    const size_t j = targets.joints.size();
+    if (!leg[targets.joints.size()] && targets.tasks >= 0) {
+      const balance::PositionRange range(joint);
+      targets.movable.push_back({joint.name, range.lower, range.upper});
+    }
     targets.joints.push_back(joint.name);
-    if (!leg[j] && targets.tasks >= 0) targets.movable.push_back({joint.name, joint.lower, joint.upper});
   }
   return targets_.emplace(std::move(targets));
 }

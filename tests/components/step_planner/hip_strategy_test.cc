@@ -43,7 +43,7 @@ class Pendulum {
     double x = capture_point;
     for (int tick = 0; tick < 3000; ++tick) {
       const double time = kTick * tick;
-      double excess = x - (kEdge - hip_.start());
+      double excess = x - (kEdge - Config().start());
       const PointMotion tilt = hip_.Update(
           {.time = time, .excess = Vector3d(std::max(excess, 0.0), 0, 0), .margin = -excess});
       largest_tilt_ = std::max(largest_tilt_, tilt.position.y());
