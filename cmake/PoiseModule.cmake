@@ -88,6 +88,9 @@ function(poise_module name)
                         INSTALL_RPATH_USE_LINK_PATH ON)
   install(TARGETS ${name} DESTINATION lib/poise/modules)
   foreach(component ${A_COMPONENTS})
+    if(component STREQUAL name)
+      message(FATAL_ERROR "poise_module: '${name}' names the module and a component; give one another name")
+    endif()
     file(CONFIGURE OUTPUT ${dir}/${component}_main.cc CONTENT [[
 #include "components/framework/module_entry.h"
 #include "components/framework/runners/component_main.h"

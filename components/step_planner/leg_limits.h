@@ -16,8 +16,8 @@ double WidestSpacing(const stepping::Reach& reach);
 /// middle.
 double LongestStride(const stepping::Reach& reach, double spacing);
 
-/// m, at most `wanted`, by which the COM can be lower than standing while either leg alone holds the
-/// robot with 0.6 of its joints' torque: a step takes the rest.
+/// m, at most `wanted`, by which the COM can be lower than standing while either leg alone holds
+/// the robot with 0.6 of its joints' torque: a step takes the rest.
 double MostLowering(const robot::RobotModel& model, double wanted);
 
 /// Throw ConfigError "`part`.gap", "`part`.clearance" with the greatest value that the legs allow.

@@ -41,6 +41,20 @@ constexpr double kSettleTime = 0.5;
 // rad, nearer than which no stance leg's joint may come to its limit while the body turns.
 constexpr double kJointReserve = 0.02;
 
+stepping::WalkCommand CommandOf(const ::steps::stride_t& stride) {
+  stepping::WalkCommand command;
+  command.stepping = stride.walks != 0 && stride.period > 0;
+  if (!command.stepping) return command;
+  command.period = stride.period;
+  for (const Foot f : kFeet) {
+    const size_t i = Index(f);
+    command.stride[f] = {{stride.ahead[i], stride.left[i]}, stride.turn[i]};
+    command.velocity += command.stride[f].position / (2 * stride.period);
+    command.turn_rate += stride.turn[i] / (2 * stride.period);
+  }
+  return command;
+}
+
 }  // namespace
 
 void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
@@ -64,6 +78,7 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
                              hip.enabled() ? hip.start() : -1);
   }
   walks_ = config.walk().enabled() && !strides_;
+  stride_port_ = strides_ && config.walk().stride_port();
   if (walks_) walk_ = MakeQuasiStaticWalk(config.walk(), config.contact(), *model_);
   footstep_report_ = FootstepReport(recovers_ ? &recovery_ : nullptr, walks_ ? &walk_ : nullptr);
   walk_commands_ = WalkCommands(config.walk());
@@ -72,6 +87,11 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
 
   wiring->AddInput(&robot_state_, "robot_state", JointAndFootCounts(*model_));
   wiring->AddInput(&operator_, "operator", {}, InputKind::kLatest);
+  std::vector<InputPort*> inputs{&robot_state_, &operator_};
+  if (stride_port_) {
+    wiring->AddInput(&stride_, "stride", {});
+    inputs.push_back(&stride_);
+  }
   wiring->AddOutput(&support_plan_, "support_plan", FootCounts(*model_));
   std::vector<OutputPort*> outputs{&support_plan_};
   if (recovers_ || walks_) {
@@ -79,11 +99,11 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
     footsteps_->stance = -1;
     outputs.push_back(&footsteps_);
   }
-  wiring->AddStage("plan", {&robot_state_, &operator_}, std::move(outputs),
-                   [this](const Tick& tick) {
-                     TakeActs(tick);
-                     support_plan_->status = Plan(tick.time);
-                   });
+  wiring->AddStage("plan", std::move(inputs), std::move(outputs), [this](const Tick& tick) {
+    if (stride_port_ && stride_.present()) planned_ = CommandOf(*stride_);
+    TakeActs(tick);
+    support_plan_->status = Plan(tick.time);
+  });
   support_plan_t& out = *support_plan_;
   const Eigen::Isometry3d identity = Eigen::Isometry3d::Identity();
   out.transition_foot = out.step_foot = -1;
@@ -114,7 +134,7 @@ void StepPlanner::ConfigureLimits(const StepPlannerConfig& config) {
 bool StepPlanner::Archive(StateArchive* archive) {
   archive->Show(operator_, operator_walk_, *schedule_, *generator_, stance_follower_,
                 *hip_strategy_, references_, in_contact_, last_controlled_, owner_, untilted_,
-                was_free_, step_needed_, recovery_, walk_, footstep_report_);
+                was_free_, step_needed_, planned_, recovery_, walk_, footstep_report_);
   for (const Foot f : kFeet) archive->Show(landing_[f], contact_loss_[f]);
   ArchiveMessage(&*support_plan_, archive);
   if (recovers_ || walks_) ArchiveMessage(&*footsteps_, archive);
@@ -169,7 +189,7 @@ int8_t StepPlanner::Act(const operate::act_t& act, double time) {
 
 stepping::WalkCommand StepPlanner::WalkCommandAt(double time) const {
   const int begun = strides_ ? recovery_.num_steps() : walk_.num_begun();
-  if (!operator_walk_.given) return walk_commands_.At(time, begun);
+  if (!operator_walk_.given) return stride_port_ ? planned_ : walk_commands_.At(time, begun);
   const double* const v = operator_walk_.velocity;
   bool stepping = operator_walk_.stepping;
   // A recovery counts a step as it begins, a walk as it ends.
@@ -517,6 +537,11 @@ ComponentType StepPlannerType() {
                    .type = MessageTraits<::steps::footsteps_t>::kName,
                    .when = {"step_planner.recovery.enabled", "step_planner.walk.enabled"},
                    .brings_channel = true});
+  AddOptionalPort({.component = "step_planner",
+                   .port = "stride",
+                   .type = MessageTraits<::steps::stride_t>::kName,
+                   .when = {"step_planner.walk.stride_port"},
+                   .input = true});
   return {
       "step_planner",
       "which feet carry, and where COM, body and feet go: phases, capture point",

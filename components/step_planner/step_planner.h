@@ -58,7 +58,7 @@ class StepPlanner : public Component, public Operated {
   void TakeActs(const Tick& tick);
   /// VERDICT_* of an operator's act.
   int8_t Act(const operate::act_t& act, double time);
-  /// The scenario's, until an operator has commanded another.
+  /// The scenario's or the port's, until an operator has commanded another.
   stepping::WalkCommand WalkCommandAt(double time) const;
   /// Steps of what walks here.
   int NumSteps() const { return strides_ ? recovery_.num_steps() : walk_.num_steps(); }
@@ -103,6 +103,7 @@ class StepPlanner : public Component, public Operated {
 
   Input<robot_state_t> robot_state_;
   ActInput operator_;
+  Input<::steps::stride_t> stride_;  // where stride_port_ is
   Output<support_plan_t> support_plan_;
   Output<::steps::footsteps_t> footsteps_;  // where it makes steps
 
@@ -120,6 +121,8 @@ class StepPlanner : public Component, public Operated {
   stepping::Recovery recovery_;
   bool walks_ = false;    // quasi-statically, where it is told to
   bool strides_ = false;  // it walks by the recovery's steps
+  bool stride_port_ = false;
+  stepping::WalkCommand planned_;  // of the port's last message
   stepping::QuasiStaticWalk walk_;
   WalkCommands walk_commands_;
   FootstepReport footstep_report_;

@@ -215,6 +215,10 @@ void CheckWalkConfig(const WalkConfig& config) {
   CheckCommands(config);
   CheckGround(config);
   // A foot of a walk is let go before it counts as a contact.
+  if (config.stride_port() && (!config.enabled() || config.quasi_static())) {
+    throw ConfigError("walk.stride_port",
+                      "is true: needs walk.enabled=true and walk.quasi_static=false");
+  }
   if (config.motion().has_settle()) CheckPositive(config.motion().settle(), "walk.motion.settle");
 }
 
@@ -302,6 +306,9 @@ std::vector<std::string> WalkWarnings(const WalkConfig& config, const robot::Rob
       warnings.emplace_back("walk.command has no effect without walk.enabled=true");
     }
     return warnings;
+  }
+  if (config.stride_port() && config.command_size() > 0) {
+    warnings.emplace_back("walk.command has no effect with walk.stride_port=true");
   }
   const StrideSize size =
       config.quasi_static() ? QuasiStaticStride(config, model) : DynamicStride(model);

@@ -167,6 +167,22 @@ test('libraries of other compiler flags give the same bits however the run is ma
   assert.ok(rows.length > 150 && rows.some((row) => row[plain] !== row[shared]), sums[0].slice(0, 400));
 });
 
+test('a planner of footsteps of her own steps at its rhythm', () => {
+  const made = join(folder, 'rhythm'), env = {POISE_PATH: made};
+  run('cmake', ['-S', join(root, 'examples/rhythm'), '-B', made, '-G', 'Ninja', `-DCMAKE_PREFIX_PATH=${prefix}`]);
+  run('cmake', ['--build', made]);
+  for (const period of [0.3, 0.4, 0.5]) {
+    const out = join(folder, `rhythm_${period}`);
+    poise(['run', 'step_in_rhythm', '--inline', '--out', out, '--set', `rhythm.period=${period}`, '--set', 'check='], {env});
+    // From touch-down to touch-down, in the middle of its eight seconds.
+    const csv = poise(['echo', 'SUPPORT_PLAN', 'stepping', '--csv', '--log', out], {env}).trim().split('\n').slice(1);
+    const landed = csv.map((line) => line.split(',').at(-1)).flatMap((now, i, all) => now === '3' && all[i - 1] !== '3' ? [0.002 * i] : []);
+    const middle = landed.filter((time) => time > 3.5 && time < 8.5);
+    const mean = (middle.at(-1) - middle[0]) / (middle.length - 1);
+    assert.ok(Math.abs(mean - period) < 0.045, `${period} s: ${mean} s, ${middle.length} landings`);
+  }
+});
+
 test('what was installed of the project is found there', () => {
   const installed = join(folder, 'installed');
   run('cmake', ['--install', own, '--prefix', installed]);

@@ -18,6 +18,14 @@ Vector2d Turned(double yaw, const Vector2d& point) { return Eigen::Rotation2Dd(y
 Footstep NextFootstep(const Footstep& stance, Foot foot, const WalkCommand& command, double period,
                       const FootstepLimits& limits) {
   const double side = Side(foot);
+  if (command.period > 0) {
+    const Footstep& asked = command.stride[foot];
+    const double ahead = std::clamp(asked.position.x(), -limits.longest, limits.longest);
+    const double apart =
+        std::clamp(side * asked.position.y(), limits.least_spacing, limits.spacing + limits.widest);
+    return {stance.position + Turned(stance.yaw, {ahead, side * apart}),
+            stance.yaw + std::clamp(asked.yaw, -limits.most_turn, limits.most_turn)};
+  }
   // Out by two steps, then none.
   const auto outwards = [&](double rate) { return rate * side > 0 ? 2 * rate * period : 0.0; };
   const Vector2d half(0, 0.5 * side * limits.spacing);
@@ -64,6 +72,7 @@ Footstep Towards(const Footstep& step, const Footstep& wanted, double most, cons
 WalkCommand Approach(const WalkCommand& from, const WalkCommand& command, double speed,
                      double turn) {
   WalkCommand next = command;
+  if (command.period > 0) return next;
   const Vector2d change = command.velocity - from.velocity;
   const double size = change.norm();
   if (size > speed) next.velocity = from.velocity + speed / size * change;

@@ -8,22 +8,28 @@
 
 namespace poise::stepping {
 
-/// What is walked: in axes of the heading.
-struct WalkCommand {
-  Eigen::Vector2d velocity = Eigen::Vector2d::Zero();  ///< m/s ahead, to the left
-  double turn_rate = 0;                                ///< rad/s, to the left
-  bool stepping = false;                               ///< walks, if only in place
-
-  bool in_place() const { return velocity.isZero(0) && turn_rate == 0; }
-  void Archive(StateArchive* archive) { archive->Show(velocity, turn_rate, stepping); }
-};
-
 /// A level sole: its centre, m, and its heading, rad.
 struct Footstep {
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
   double yaw = 0;
 
   void Archive(StateArchive* archive) { archive->Show(position, yaw); }
+};
+
+/// What is walked: in axes of the heading.
+struct WalkCommand {
+  Eigen::Vector2d velocity = Eigen::Vector2d::Zero();  ///< m/s ahead, to the left
+  double turn_rate = 0;                                ///< rad/s, to the left
+  bool stepping = false;                               ///< walks, if only in place
+  /// s from touch-down to touch-down; above 0, `stride` says where each foot comes down from the
+  /// other sole, in its axes, and `velocity` and `turn_rate` are what that comes to.
+  double period = 0;
+  FootArray<Footstep> stride;
+
+  bool in_place() const { return velocity.isZero(0) && turn_rate == 0; }
+  void Archive(StateArchive* archive) {
+    archive->Show(velocity, turn_rate, stepping, period, stride);
+  }
 };
 
 struct FootstepLimits {

@@ -10,6 +10,9 @@ using Eigen::Vector2d;
 
 // m by which a walk's foothold may miss its place before a recovery's step is looked for.
 constexpr double kMostMissed = 0.05;
+// ωT of a step that another planner asks for, at most: what the capture point is off by has grown
+// 20 times then.
+constexpr double kLongestStride = 3;
 // Share of the standing height by which a push must have moved a walk's foothold for the step to
 // tell nothing of undisturbed ones.
 constexpr double kMoved = 0.08;
@@ -17,7 +20,14 @@ constexpr double kMoved = 0.08;
 }  // namespace
 
 Gait Recovery::gait(const StepState& state) const {
-  return {stride_.Corrected(command_), spec_.stride / state.pendulum.frequency, 0.5 * spec_.load,
+  const double transfer = 0.5 * spec_.load;
+  if (command_.period > 0) {
+    const StepLimits& limits = choice_.limits();
+    const double least = limits.unload + limits.least_swing + transfer;
+    const double most = std::max(least, kLongestStride / state.pendulum.frequency);
+    return {command_, std::clamp(command_.period, least, most), transfer, spec_.gain};
+  }
+  return {stride_.Corrected(command_), spec_.stride / state.pendulum.frequency, transfer,
           spec_.gain};
 }
 
@@ -77,7 +87,7 @@ void Recovery::ShiftToStride(const StepInput& input, const StepState& state, dou
 }
 
 void Recovery::CountStride(const StepInput& input) {
-  if (!command_.stepping || reason_ != StepReason::kWalk ||
+  if (!command_.stepping || command_.period > 0 || reason_ != StepReason::kWalk ||
       plan_.moved > kMoved * standing_height_) {
     stride_.Forget();
     return;

@@ -25,6 +25,22 @@ using robot::TestRobot;
 
 FootstepLimits Limits() { return {0.21, 0.17, 0.3, 0.15, 0.4}; }
 
+// What another planner asks for, and nothing else; clipped to what the legs allow.
+TEST(Footsteps, AStrideThatIsGivenIsWalkedAsFarAsLegsReach) {
+  WalkCommand command{.stepping = true, .period = 0.4};
+  command.stride[Foot::kRight] = {{0.1, -0.2}, -0.1};
+  command.stride[Foot::kLeft] = {{0.5, 0.1}, 1};
+  const Footstep stance{{1, 2}, std::numbers::pi / 2};  // ahead is y, left is −x
+  const Footstep right = NextFootstep(stance, Foot::kRight, command, 1, Limits());
+  EXPECT_LT((right.position - Vector2d(1.2, 2.1)).norm(), 1e-12);
+  EXPECT_NEAR(right.yaw, stance.yaw - 0.1, 1e-12);
+  const Footstep left = NextFootstep(stance, Foot::kLeft, command, 1, Limits());
+  EXPECT_LT((left.position - Vector2d(1 - 0.17, 2.3)).norm(), 1e-12);
+  EXPECT_NEAR(left.yaw, stance.yaw + 0.4, 1e-12);
+  // It is taken over at once: who plans the feet plans how fast they set off.
+  EXPECT_EQ(Approach({}, command, 0, 0).stride[Foot::kRight].position.x(), 0.1);
+}
+
 // By Runge and Kutta, on one sole after the other: where a stride ends the next one begins.
 TEST(Footsteps, TheCapturePointComesAgainWithEveryTwoStrides) {
   const double w = 3.7, period = 0.35;
