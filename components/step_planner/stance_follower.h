@@ -26,10 +26,10 @@ class StanceFollower {
     bool carried = false;  ///< both feet carry the robot
     bool resting = false;  ///< no move of the COM's reference is under way or to come
   };
-  /// Once a tick, `time` in s, not decreasing. How far the COM's reference is to be moved from
-  /// where it rests, m, world, horizontally; zero: not at all. It goes with the point of the line
-  /// between the soles beside which it rests: from the middle with both alike, from above one with
-  /// that one. From `distance` on that this point has gone, until next to none of it is left.
+  /// Once a tick, `time` in s, not decreasing. Returns how far the COM's reference is to be moved,
+  /// m, world, horizontally; zero: not at all. The reference follows the point between the soles
+  /// that lies nearest to it: halfway between them it follows both alike, above one sole that one
+  /// alone. It begins to follow once this point has moved by `distance`, and then goes all the way.
   Eigen::Vector3d Update(double time, const Stance& stance);
   /// The COM's reference goes to where the soles are now: what they did before counts no more.
   void Restart() { known_ = following_ = false; }
@@ -40,7 +40,7 @@ class StanceFollower {
  private:
   double distance_;         // m
   bool known_ = false;      // sole_ is
-  bool following_ = false;  // the distance has been gone beyond
+  bool following_ = false;  // the soles have moved by more than the distance
   bool carried_ = false;    // in the last tick
   double since_ = 0;        // s, from when on
   // m, that the reference belongs to.

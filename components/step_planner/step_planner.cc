@@ -70,17 +70,18 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   contact_ = config.contact();
   landing_ = robot::FootArray<Landing>(Landing(contact_));
   contact_loss_ = robot::FootArray<ContactLoss>(ContactLoss(contact_));
-  strides_ = config.walk().enabled() && !config.walk().quasi_static();
-  recovers_ = config.recovery().enabled() || strides_;
-  if (recovers_) {
+  walks_by_steps_ = config.walk().enabled() && !config.walk().quasi_static();
+  makes_steps_ = config.recovery().enabled() || walks_by_steps_;
+  if (makes_steps_) {
     const HipStrategyConfig& hip = config.hip_strategy();
     recovery_ = MakeRecovery(config.recovery(), config.contact(), *model_,
                              hip.enabled() ? hip.start() : -1);
   }
-  walks_ = config.walk().enabled() && !strides_;
-  stride_port_ = strides_ && config.walk().stride_port();
-  if (walks_) walk_ = MakeQuasiStaticWalk(config.walk(), config.contact(), *model_);
-  footstep_report_ = FootstepReport(recovers_ ? &recovery_ : nullptr, walks_ ? &walk_ : nullptr);
+  walks_quasi_static_ = config.walk().enabled() && !walks_by_steps_;
+  stride_port_ = walks_by_steps_ && config.walk().stride_port();
+  if (walks_quasi_static_) walk_ = MakeQuasiStaticWalk(config.walk(), config.contact(), *model_);
+  footstep_report_ =
+      FootstepReport(makes_steps_ ? &recovery_ : nullptr, walks_quasi_static_ ? &walk_ : nullptr);
   walk_commands_ = WalkCommands(config.walk());
   state_ = robot::RobotState(model_->num_joints());
   in_contact_ = ContactsOf(config.phase(0).support());
@@ -94,7 +95,7 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   }
   wiring->AddOutput(&support_plan_, "support_plan", FootCounts(*model_));
   std::vector<OutputPort*> outputs{&support_plan_};
-  if (recovers_ || walks_) {
+  if (makes_steps_ || walks_quasi_static_) {
     wiring->AddOutput(&footsteps_, "footsteps", {});
     footsteps_->stance = -1;
     outputs.push_back(&footsteps_);
@@ -137,7 +138,7 @@ bool StepPlanner::Archive(StateArchive* archive) {
                 was_free_, step_needed_, planned_, recovery_, walk_, footstep_report_);
   for (const Foot f : kFeet) archive->Show(landing_[f], contact_loss_[f]);
   ArchiveMessage(&*support_plan_, archive);
-  if (recovers_ || walks_) ArchiveMessage(&*footsteps_, archive);
+  if (makes_steps_ || walks_quasi_static_) ArchiveMessage(&*footsteps_, archive);
   return true;
 }
 
@@ -152,7 +153,7 @@ int8_t StepPlanner::Act(const operate::act_t& act, double time) {
   using operate::answer_t;
   switch (act.kind) {
     case act_t::KIND_WALK:
-      if (!walks_ && !strides_) return answer_t::VERDICT_NOT_ABLE;
+      if (!walks_quasi_static_ && !walks_by_steps_) return answer_t::VERDICT_NOT_ABLE;
       for (int i = 0; i < 3; ++i) {
         if (!(std::abs(act.velocity[i]) <= kFastestWalk)) return answer_t::VERDICT_RANGE;
       }
@@ -160,17 +161,18 @@ int8_t StepPlanner::Act(const operate::act_t& act, double time) {
       std::copy_n(act.velocity, 3, operator_walk_.velocity);
       return answer_t::VERDICT_DONE;
     case act_t::KIND_STAND:
-      if (!walks_ && !recovers_) return answer_t::VERDICT_NOT_ABLE;
-      if (recovers_ && owner_ != FeetOwner::kWalk) {
+      if (!walks_quasi_static_ && !makes_steps_) return answer_t::VERDICT_NOT_ABLE;
+      if (makes_steps_ && owner_ != FeetOwner::kWalk) {
         const bool stands = Count(in_contact_) == 2 && last_controlled_;
         const bool rests = stands && owner_ != FeetOwner::kRecovery;
-        if (!walks_ && !rests && !recovery_.command().stepping) return answer_t::VERDICT_NOT_NOW;
+        if (!walks_quasi_static_ && !rests && !recovery_.command().stepping)
+          return answer_t::VERDICT_NOT_NOW;
         if (rests) recovery_.BringTogether();
       }
       operator_walk_ = {.given = true};
       return answer_t::VERDICT_DONE;
     case act_t::KIND_STEP: {
-      if (!walks_ && !strides_) return answer_t::VERDICT_NOT_ABLE;
+      if (!walks_quasi_static_ && !walks_by_steps_) return answer_t::VERDICT_NOT_ABLE;
       if (act.foot >= static_cast<int>(kFeet.size())) return answer_t::VERDICT_UNKNOWN;
       const bool stands = Count(in_contact_) == 2 && last_controlled_;
       if (!stands || Steps() != nullptr) return answer_t::VERDICT_NOT_NOW;
@@ -188,7 +190,7 @@ int8_t StepPlanner::Act(const operate::act_t& act, double time) {
 }
 
 stepping::WalkCommand StepPlanner::WalkCommandAt(double time) const {
-  const int begun = strides_ ? recovery_.num_steps() : walk_.num_begun();
+  const int begun = walks_by_steps_ ? recovery_.num_steps() : walk_.num_begun();
   if (!operator_walk_.given) return stride_port_ ? planned_ : walk_commands_.At(time, begun);
   const double* const v = operator_walk_.velocity;
   bool stepping = operator_walk_.stepping;
@@ -245,12 +247,13 @@ double StepPlanner::LoadDeviation(Foot foot) const {
 }
 
 void StepPlanner::LeadFeet(double time, const robot::FootArray<double>& load) {
-  if (!recovers_ && !walks_) return;
+  if (!makes_steps_ && !walks_quasi_static_) return;
   const stepping::StepInput input = SeeSteps(time, load);
-  if (recovers_ && (owner_ != FeetOwner::kWalk || walk_.Lost(input)) && recovery_.Update(input)) {
+  if (makes_steps_ && (owner_ != FeetOwner::kWalk || walk_.Lost(input)) &&
+      recovery_.Update(input)) {
     HandOver(FeetOwner::kRecovery, time);
     walk_.Stop(time);
-  } else if (walks_ && walk_.Update(input, WalkCommandAt(time))) {
+  } else if (walks_quasi_static_ && walk_.Update(input, WalkCommandAt(time))) {
     HandOver(FeetOwner::kWalk, time);
   } else if (const stepping::StepOutput* last = Steps(); last != nullptr) {
     const bool as_planned = ContactsOf(schedule_->phase().support()) == last->in_contact;
@@ -297,7 +300,7 @@ stepping::StepInput StepPlanner::SeeSteps(double time, const robot::FootArray<do
   input.com_height = references_.com.position.z();
   input.step_needed = support_plan_->step_needed != 0;
   input.allowed = last_controlled_;
-  if (strides_) input.command = WalkCommandAt(time);
+  if (walks_by_steps_) input.command = WalkCommandAt(time);
   for (const Foot f : kFeet) {
     if (in_contact_[f]) continue;
     input.free_foot = references_.foot[f];
@@ -384,16 +387,16 @@ void StepPlanner::Report(double time, const Capture& capture) {
   if (soles.num_corners > 0) {
     ReportCapture(time, capture.frame_o, soles, capture.pendulum, &step_needed_, plan);
   }
-  if (!recovers_ && !walks_) return;
-  const bool walking = walks_ && owner_ != FeetOwner::kRecovery;
+  if (!makes_steps_ && !walks_quasi_static_) return;
+  const bool walking = walks_quasi_static_ && owner_ != FeetOwner::kRecovery;
   ReportStepping(walking ? walk_.status(estimate.sole) : recovery_.status(),
                  walking && walk_.active() ? walk_.command() : recovery_.command(), time,
                  estimate.sole, plan);
   plan->num_steps = recovery_.num_steps() + walk_.num_begun();
   const FootstepInput input{
       .time = time, .com_height = data.com.z(), .sole = estimate.sole, .in_contact = in_contact_};
-  footstep_report_.Update(input, recovers_ ? &recovery_ : nullptr, walks_ ? &walk_ : nullptr,
-                          &*footsteps_);
+  footstep_report_.Update(input, makes_steps_ ? &recovery_ : nullptr,
+                          walks_quasi_static_ ? &walk_ : nullptr, &*footsteps_);
 }
 
 StepPlanner::Capture StepPlanner::ComputeCapture() const {
@@ -470,7 +473,7 @@ void StepPlanner::TiltBody(double time, const Capture& capture) {
     }
   }
   // The turning body takes of the centre of pressure that a step needs.
-  if (recovers_ && recovery_.would_step()) input.excess.setZero();
+  if (makes_steps_ && recovery_.would_step()) input.excess.setZero();
   // About one axis the rotation vector's derivatives are the angular velocity and acceleration; of
   // a turn that goes over into another, or comes upon the plan's own, only nearly.
   const PointMotion tilt = hip_strategy_->Update(input);

@@ -61,7 +61,7 @@ class StepPlanner : public Component, public Operated {
   /// The scenario's or the port's, until an operator has commanded another.
   stepping::WalkCommand WalkCommandAt(double time) const;
   /// Steps of what walks here.
-  int NumSteps() const { return strides_ ? recovery_.num_steps() : walk_.num_steps(); }
+  int NumSteps() const { return walks_by_steps_ ? recovery_.num_steps() : walk_.num_steps(); }
   /// STATUS_* of the plan.
   int8_t Plan(double time);
   /// What the robot says to the schedule.
@@ -117,10 +117,10 @@ class StepPlanner : public Component, public Operated {
   robot::FootArray<Landing> landing_{Landing(contact_)};
   robot::FootArray<ContactLoss> contact_loss_{ContactLoss(contact_)};
   HeldCondition step_needed_;
-  bool recovers_ = false;  // steps are made
+  bool makes_steps_ = false;  // steps are made
   stepping::Recovery recovery_;
-  bool walks_ = false;    // quasi-statically, where it is told to
-  bool strides_ = false;  // it walks by the recovery's steps
+  bool walks_quasi_static_ = false;  // quasi-statically, where it is told to
+  bool walks_by_steps_ = false;      // it walks by the recovery's steps
   bool stride_port_ = false;
   stepping::WalkCommand planned_;  // of the port's last message
   stepping::QuasiStaticWalk walk_;

@@ -6,7 +6,7 @@ const char* StepReason(int8_t reason) {
   switch (reason) {
     case support_plan_t::REASON_PERSISTENT:
       return "the capture point stays beyond the soles";
-    case support_plan_t::REASON_SURE:
+    case support_plan_t::REASON_OUTSIDE:
       return "the capture point is farther beyond the soles than balancing brings back";
     case support_plan_t::REASON_LINGERING:
       return "the capture point lingers at the soles' edge and comes out";

@@ -376,7 +376,7 @@ TEST_F(EventsTest, AStepThatAWalkMakesAnywayIsNotCalledFor) {
     plan.capture_point[1] = t < 60 ? 0 : -0.5;  // pushed aside
   }
   EXPECT_THAT(Named("step_needed"), ElementsAre(Is(0.12, "step_needed", "a foot at")));
-  for (size_t t = 30; t < 80; ++t) plan_[t].step_reason = support_plan_t::REASON_SURE;
+  for (size_t t = 30; t < 80; ++t) plan_[t].step_reason = support_plan_t::REASON_OUTSIDE;
   EXPECT_THAT(Named("step_needed"), ElementsAre(Is(0.06, "step_needed", "a foot at")));
 }
 
@@ -404,7 +404,7 @@ class StepEventsTest : public EventsTest {
       support_plan_t& plan = plan_[t];
       plan.step_foot = t < 30 ? -1 : 1;
       plan.num_steps = t < 30 ? 0 : 1;
-      plan.step_reason = support_plan_t::REASON_SURE;
+      plan.step_reason = support_plan_t::REASON_OUTSIDE;
       plan.stepping = t < 30   ? support_plan_t::STEPPING_NONE
                       : t < 60 ? support_plan_t::STEPPING_SWINGING
                       : t < 80 ? support_plan_t::STEPPING_LOADING

@@ -41,7 +41,7 @@ struct StepInput {
 enum class StepReason : int8_t {
   kNone = support_plan_t::REASON_NONE,
   kPersistent = support_plan_t::REASON_PERSISTENT,  ///< the capture point stayed beyond the soles
-  kSure = support_plan_t::REASON_SURE,  ///< so far beyond that nothing else can bring it back
+  kOutside = support_plan_t::REASON_OUTSIDE,  ///< so far beyond that nothing else can bring it back
   kLingering = support_plan_t::REASON_LINGERING,  ///< at the edge for long, and coming out
   kAgain = support_plan_t::REASON_AGAIN,          ///< the step before did not catch it
   kWalk = support_plan_t::REASON_WALK,            ///< the robot walks

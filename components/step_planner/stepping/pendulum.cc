@@ -17,16 +17,16 @@ Pendulum After(const Pendulum& pendulum, const Eigen::Vector2d& cop, double time
           w * sine * offset + cosine * pendulum.velocity, w};
 }
 
-double CaptureRegion(double frequency, double rest, double reach, double step_time, int steps) {
+double CaptureRegion(double frequency, double radius, double reach, double step_time, int steps) {
   const double decay = std::exp(-frequency * step_time);
-  double region = rest;
-  for (int i = 0; i < steps; ++i) region = rest + (reach - rest + region) * decay;
+  double region = radius;
+  for (int i = 0; i < steps; ++i) region = radius + (reach - radius + region) * decay;
   return region;
 }
 
-double LargestImpulse(double mass, double frequency, double rest, double reach, double step_time,
+double LargestImpulse(double mass, double frequency, double radius, double reach, double step_time,
                       int steps) {
-  return mass * frequency * CaptureRegion(frequency, rest, reach, step_time, steps);
+  return mass * frequency * CaptureRegion(frequency, radius, reach, step_time, steps);
 }
 
 }  // namespace poise::stepping

@@ -24,13 +24,13 @@ Pendulum After(const Pendulum& pendulum, const Eigen::Vector2d& cop, double time
 
 /// Largest sudden impulse, N·s, at the COM that is survived with N steps, each `step_time` s after
 /// the one before: m ω d_N with d_0 = r, d_N = r + (l − r + d_{N−1}) e^{−ωT} (Koolen et al. 2012,
-/// eq. 31). `rest`: r, m from the COM at rest to the edge of the support, the same of the sole that
-/// each step stands on; `reach`: l, m, from the centre of pressure at an edge to that of the next
-/// foot's. With N = 1: m ω (r + l e^{−ωT}).
-double LargestImpulse(double mass, double frequency, double rest, double reach, double step_time,
+/// eq. 31). `radius`: r, m from the COM at rest to the edge of the support, the same of the sole
+/// that each step stands on; `reach`: l, m, from the centre of pressure at an edge to that of the
+/// next foot's. With N = 1: m ω (r + l e^{−ωT}).
+double LargestImpulse(double mass, double frequency, double radius, double reach, double step_time,
                       int steps);
 
 /// d_N above without the mass: how far beyond the point that carries the capture point may be.
-double CaptureRegion(double frequency, double rest, double reach, double step_time, int steps);
+double CaptureRegion(double frequency, double radius, double reach, double step_time, int steps);
 
 }  // namespace poise::stepping

@@ -13,8 +13,8 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double kRiseOver = 0.5;  // share of a swing before which no load is a landing
-// Time constant, as a share of the settling, with which a foot that touches is let go; of at most
-// so many s of it.
+// A foot that touches is let go with a time constant of kLetGo of its settling, which counts as
+// kLongestLetGo, s, at most.
 constexpr double kLetGo = 0.25, kLongestLetGo = 0.06;
 constexpr int kHalvings = 40;  // of [0, 1]
 // m that told ground is higher to be an edge that the foot rises over, and the share of the swing

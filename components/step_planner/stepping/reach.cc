@@ -241,12 +241,12 @@ Vector2d Reach::ComAbove(Foot stance, const Vector2d& com) const {
   return excess > roll_ ? Vector2d(nearest + roll_ / excess * (com - nearest)) : com;
 }
 
-balance::ConvexPolygon Reach::Footholds(Foot foot, const Vector2d& com, Place place) const {
+balance::ConvexPolygon Reach::Footholds(Foot foot, const Vector2d& com, Crossing crossing) const {
   const Vector2d above = ComAbove(Other(foot), com);
   balance::ConvexPolygon reached = leg_[foot][1];
   for (Vector2d& corner : reached.mutable_corners()) corner += above;
-  if (place == Place::kAhead) return balance::Clip(reached, {{-1, 0}, -least_ahead_});
-  if (place == Place::kBehind) return balance::Clip(reached, {{1, 0}, -least_ahead_});
+  if (crossing == Crossing::kInFront) return balance::Clip(reached, {{-1, 0}, -least_ahead_});
+  if (crossing == Crossing::kBehind) return balance::Clip(reached, {{1, 0}, -least_ahead_});
   const double side = Side(foot);
   return balance::Clip(reached, {{0, -side}, -least_spacing_});
 }

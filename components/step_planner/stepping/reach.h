@@ -15,8 +15,8 @@ balance::ConvexPolygon SoleAt(const robot::FootModel& foot, double margin,
                               const Eigen::Vector2d& centre, double yaw);
 /// Hull of two polygons; of the corners beyond what a polygon holds the last are left out.
 balance::ConvexPolygon HullOf(const balance::ConvexPolygon& a, const balance::ConvexPolygon& b);
-/// Where a foothold is, seen from the sole that stands.
-enum class Place { kBeside, kAhead, kBehind };
+/// How a foot crosses the sole that stands: not at all, it comes down on its own side.
+enum class Crossing { kNone, kInFront, kBehind };
 
 /// The legs' reach for an upright body with level soles. All in axes of the body's heading, x
 /// ahead, y to the left, m.
@@ -52,7 +52,7 @@ class Reach {
   /// `gap` between them. So the legs span what is between the soles, wherever `com` is. Beside, the
   /// legs do not cross; of the other two that is not said.
   balance::ConvexPolygon Footholds(Foot foot, const Eigen::Vector2d& com,
-                                   Place place = Place::kBeside) const;
+                                   Crossing crossing = Crossing::kNone) const;
   double least_spacing() const { return least_spacing_; }  ///< m between the soles' centres
   double least_ahead() const { return least_ahead_; }      ///< the same, one ahead of the other
   double lowering() const { return lowering_; }            ///< m

@@ -23,23 +23,24 @@ constexpr double kStepOnShare = 0.5;
 // Share of the angular momentum about the COM that counts in the capture point: what the swinging
 // leg and the turning body give to the COM and take from it then moves no foothold.
 constexpr double kMomentumShare = 0.5;
-// 1/s, critically damped: the return of a turned body to upright, for which the COM's reference
-// leaves room within the soles, while both carry at most so many m of centre of pressure.
+// 1/s, critically damped: a turned body returns to upright at this rate, and the COM's reference
+// leaves room within the soles for what that takes.
 constexpr double kLeanRate = 6;
-constexpr double kCatchBudget = 0.1;
-// The robot rests once the capture point is within so many m of the soles' middle and the COM
-// slower than so many m/s for so many s: a swing of the COM is longer.
+constexpr double kCatchBudget = 0.1;  // m of centre of pressure that it takes at most on both feet
+// The robot is at rest once the capture point has been within kStillDistance, m, of the soles'
+// middle, and the COM slower than kStillSpeed, m/s, for kStillTime, s. A swing of the COM lasts
+// longer.
 constexpr double kStillDistance = 0.03, kStillSpeed = 0.06, kStillTime = 0.3;
-// s that the COM rests beside the middle until that is rest: the joints' friction holds it there.
+// s after which a COM that stands still beside the middle is at rest, too: friction of the joints
+// holds it there.
 constexpr double kStillBesideTime = 1;
 // Share of a swing before which a load is the ground that the foot leaves, or a tap on the way up.
 constexpr double kLeastProgress = 0.5;
-// Feet are put side by side as no fall is to be caught: s in which the COM goes above the foot that
-// stays, and times that after which this is given up; s of the load's ramps; s in the air; the
-// gain, since the joints' friction leaves less of an error with it.
-constexpr double kTogetherShift = 1.5, kMostShifts = 2.5;
-constexpr double kTogetherRamp = 0.2, kTogetherSwing = 0.7;
-constexpr double kTogetherGain = 1;
+// Feet are put side by side without haste, as no fall is to be caught.
+constexpr double kTogetherShift = 1.5;  // s in which the COM goes above the foot that stays
+constexpr double kMostShifts = 2.5;     // times that, after which it is given up
+constexpr double kTogetherRamp = 0.2, kTogetherSwing = 0.7;  // s, of the load and in the air
+constexpr double kTogetherGain = 1;  // friction of the joints leaves less of an error with it
 constexpr double kTogetherDistance = 0.03;  // m from side by side that is side by side
 
 }  // namespace
@@ -158,7 +159,7 @@ StepReason Recovery::NeedOfFirstStep(const StepInput& input, const StepState& st
   }
   if (!(excess > 0)) return StepReason::kNone;
   if (input.step_needed) return StepReason::kPersistent;
-  return excess > kHopelessExcess ? StepReason::kSure : StepReason::kNone;
+  return excess > kHopelessExcess ? StepReason::kOutside : StepReason::kNone;
 }
 
 StepStatus Recovery::status() const {
@@ -329,7 +330,7 @@ void Recovery::Swings(const StepInput& input, const StepState& state) {
     if (stage_ == Stage::kSwinging) swing_.Move(plan_.foothold, input.time, touch_down_);
   } else if (left > spec_.swing.freeze) {
     const bool around = stage_ == Stage::kSwinging && swing_.around();
-    const StepPlan next = choice_.At(state, plan_.foot, left, plan_.place);
+    const StepPlan next = choice_.At(state, plan_.foot, left, plan_.crossing);
     // A foothold that the way under way does not lead to is none.
     if (std::isfinite(next.margin) && (stage_ == Stage::kUnloading || around || !next.around)) {
       plan_ = next;
@@ -348,7 +349,7 @@ void Recovery::Hurry(const StepState& state, double time) {
   since_ = time - share * UnloadTime();
   ramp_from_ = share;
   cop_from_ = output_.cop;
-  const StepPlan next = choice_.Plan(state, plan_.foot, plan_.place);
+  const StepPlan next = choice_.Plan(state, plan_.foot, plan_.crossing);
   touch_down_ = std::min(touch_down_, time + next.time - share * UnloadTime());
 }
 

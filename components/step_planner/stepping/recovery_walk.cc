@@ -74,7 +74,7 @@ void Recovery::TurnBody(const StepState& state, double period) {
 
 void Recovery::ShiftToStride(const StepInput& input, const StepState& state, double excess) {
   if (excess > kLeastExcess) {
-    BeginStep(input, choice_.Choose(state), StepReason::kSure);
+    BeginStep(input, choice_.Choose(state), StepReason::kOutside);
   } else if (!command_.stepping) {
     stage_ = Stage::kCatching;
     since_ = moving_since_ = input.time;

@@ -14,13 +14,12 @@ using Eigen::Vector2d;
 
 // Greatest acceleration of a minimum-jerk line of unit length and time.
 constexpr double kQuinticAcceleration = 5.7735026918962577;
-// The step's time and the foothold, each of which follows from the other, after so many rounds.
-constexpr int kRounds = 4;
+constexpr int kRounds = 4;  // of the step's time and foothold, each of which follows from the other
 constexpr double kFixedPoint = 2e-3;  // s, a tick: the step's time is found to that
 constexpr double kLater = 0.06;       // s, after which a place out of reach is tried again
 // m of margin for which a step may take a second longer.
 constexpr double kMarginOfTime = 0.05;
-// m by which a way may cut the corner that it keeps off: what standing feet are off by.
+// m by which a swing may cut the corner of the stance leg's room: feet that stand are off by that.
 constexpr double kCut = 0.005;
 constexpr double kOffReach = 1e-9;  // m off a polygon that is rounding
 // ωT of a step at most: what the capture point is off by has grown 55 times then, beyond any reach.
@@ -51,7 +50,7 @@ bool IsFree(const Vector2d& from, const Vector2d& to, const Vector2d& half) {
 
 void StepPlan::Archive(StateArchive* archive) {
   archive->Show(possible, foot, time, foothold, yaw, cop, capture_point, com, margin, follows,
-                missed, moved, place, around, corner);
+                missed, moved, crossing, around, corner);
 }
 
 double SwingTime(double distance, double acceleration) {
@@ -131,10 +130,10 @@ StepPlan StepChoice::Until(const StepState& state, Foot foot, double time,
   return plan;
 }
 
-StepPlan StepChoice::At(const StepState& state, Foot foot, double time, Place place) const {
+StepPlan StepChoice::At(const StepState& state, Foot foot, double time, Crossing crossing) const {
   const Foot s = Other(foot);
   StepPlan plan = Until(state, foot, time, BrakingPoint(state, s));
-  plan.place = place;
+  plan.crossing = crossing;
   // From here on in axes of the heading, from the stance sole.
   const Eigen::Matrix2d turn = Eigen::Rotation2Dd(state.yaw).toRotationMatrix();
   const auto local = [&](const Vector2d& point) -> Vector2d {
@@ -146,7 +145,7 @@ StepPlan StepChoice::At(const StepState& state, Foot foot, double time, Place pl
   Vector2d wanted = caught;
   if (distance > 0) wanted += limits_.overshoot / distance * away;
   const double side = Side(foot);
-  if (place == Place::kBeside) {
+  if (crossing == Crossing::kNone) {
     // Side by side as when standing, and nearer where the capture point is on the stance foot's
     // side.
     const double narrow =
@@ -165,18 +164,18 @@ StepPlan StepChoice::At(const StepState& state, Foot foot, double time, Place pl
 void StepChoice::PutDown(const StepState& state, const Vector2d& wanted, StepPlan* plan) const {
   const Foot foot = plan->foot, stance = Other(foot);
   const Foot s = stance;
-  const Place place = plan->place;
+  const Crossing crossing = plan->crossing;
   const Eigen::Matrix2d turn = Eigen::Rotation2Dd(state.yaw).toRotationMatrix();
   const auto local = [&](const Vector2d& point) -> Vector2d {
     return turn.transpose() * (point - state.sole[s]);
   };
   const Vector2d com = local(plan->com);
   plan->follows = balance::SignedDistance(reach_.Leg(stance, 1), Vector2d(-com));
-  const balance::ConvexPolygon footholds = reach_.Footholds(foot, com, place);
+  const balance::ConvexPolygon footholds = reach_.Footholds(foot, com, crossing);
   Vector2d foothold(0, Side(foot) * limits_.spacing);
   bool reached = footholds.num_corners > 0;
   if (reached) foothold = balance::NearestPoint(footholds, wanted);
-  if (place != Place::kBeside && reached) {
+  if (crossing != Crossing::kNone && reached) {
     reached = ClearOfLeg(foot, reach_.ComAbove(stance, com), &foothold) &&
               balance::SignedDistance(footholds, foothold) >= -kOffReach;
   }
@@ -255,12 +254,12 @@ StepPlan StepChoice::Stride(const StepState& state, Foot foot, const Gait& gait,
   return plan;
 }
 
-StepPlan StepChoice::Plan(const StepState& state, Foot foot, Place place) const {
+StepPlan StepChoice::Plan(const StepState& state, Foot foot, Crossing crossing) const {
   const double unload = state.in_contact[foot] ? limits_.unload : 0;
   double time = unload + limits_.least_swing;
   StepPlan plan;
   for (int i = 0; i < kRounds; ++i) {
-    plan = At(state, foot, time, place);
+    plan = At(state, foot, time, crossing);
     const Vector2d& from = state.sole[foot];
     const double swing =
         plan.around
@@ -337,7 +336,7 @@ StepPlan StepChoice::Best(const StepState& state, Foot foot, int more, double* l
   if (!(limits_.leg_distance > 0) || beside.margin >= limits_.ample_margin) return best;
   const Vector2d away = state.pendulum.capture_point() - state.sole[Other(foot)];
   const double ahead = std::cos(state.yaw) * away.x() + std::sin(state.yaw) * away.y();
-  consider(Plan(state, foot, ahead < 0 ? Place::kBehind : Place::kAhead));
+  consider(Plan(state, foot, ahead < 0 ? Crossing::kBehind : Crossing::kInFront));
   return best;
 }
 

@@ -55,7 +55,7 @@ struct StepPlan {
   double follows = 0;
   double missed = 0;  ///< m from where the foot was wanted to the foothold
   double moved = 0;   ///< m from the foothold of the undisturbed gait; of a walk's step
-  Place place = Place::kBeside;
+  Crossing crossing = Crossing::kNone;
   bool around = false;  ///< the way goes around the stance leg, by `corner`, m
   Eigen::Vector2d corner = Eigen::Vector2d::Zero();
 
@@ -92,11 +92,12 @@ class StepChoice {
   StepPlan Next(const StepState& state, Foot foot) const;
   /// The step of `foot`, whose least time is iterated from the swing that it takes, around the
   /// stance leg where it must. One that takes longer than the pendulum lets a step be is none.
-  StepPlan Plan(const StepState& state, Foot foot, Place place = Place::kBeside) const;
+  StepPlan Plan(const StepState& state, Foot foot, Crossing crossing = Crossing::kNone) const;
   /// The foothold of `foot` for a touch-down `time` s from now, the centre of pressure at the
   /// stance sole's point nearest to the capture point. Within what both legs span, also
   /// where the COM has left it.
-  StepPlan At(const StepState& state, Foot foot, double time, Place place = Place::kBeside) const;
+  StepPlan At(const StepState& state, Foot foot, double time,
+              Crossing crossing = Crossing::kNone) const;
   /// The step of `foot` that goes on with `gait`, its touch-down `time` s from now: where the
   /// capture point has its nominal place from the sole.
   StepPlan StrideAt(const StepState& state, Foot foot, const Gait& gait, double time) const;

@@ -209,7 +209,7 @@ TEST_P(AroundCase, NoSoleOrLegMeetsTheOther) {
       EXPECT_GE(
           Between(model_.feet()[0], state.sole[0], model_.feet()[1], Vector2d(sole.head<2>())),
           gap_ - 0.006);
-      if (plan.place == Place::kBeside) continue;
+      if (plan.crossing == Crossing::kNone) continue;
       const Vector2d com = After(state.pendulum, plan.cop, time).com;
       const Vector3d middle(com.x(), com.y(), height_ - 0.03);
       // Twice the radius of a leg of 5 cm.

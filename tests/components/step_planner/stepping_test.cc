@@ -339,7 +339,7 @@ TEST_P(ReachCase, NoFootholdIsBeyondWhatBothLegsSpan) {
       return turn.transpose() * (plan.foothold - state.sole[robot::Index(Other(plan.foot))]);
     };
     for (const Foot foot : kFeet) {
-      for (const Place place : {Place::kBeside, Place::kAhead, Place::kBehind}) {
+      for (const Crossing crossing : {Crossing::kNone, Crossing::kInFront, Crossing::kBehind}) {
         const StepPlan plan = choice.At(state, foot, 1 + any(random), place);
         ASSERT_TRUE(plan.foothold.allFinite());
         if (!std::isfinite(plan.margin)) continue;
