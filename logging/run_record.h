@@ -1,7 +1,6 @@
 // A run's log as typed time series.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -31,37 +30,6 @@
 #include "poise/task_torque_t.hpp"
 
 namespace poise::logging {
-
-/// What a method of the state estimator makes of a run's readings.
-struct Estimates {
-  Series<robot_state_t> state;
-  Series<estimator_status_t> status;
-};
-
-/// Puts messages of one size by tick into a series that is in a scratch file from now on.
-template <class T>
-class PagedAppender {
- public:
-  /// Throws LogError.
-  explicit PagedAppender(Series<T>* series)
-      : bytes_(PagedFile::Scratch()),
-        paged_(std::make_shared<PagedSeries<T>>(bytes_, [](std::span<const uint8_t> data, T* item) {
-          item->decode(data.data(), 0, static_cast<int>(data.size()));
-        })) {
-    series->Page(paged_);
-  }
-  /// Throws LogError.
-  void Set(int64_t tick, const T& message) {
-    encoded_.resize(static_cast<size_t>(message.getEncodedSize()));
-    message.encode(encoded_.data(), 0, static_cast<int>(encoded_.size()));
-    paged_->Place(tick, bytes_->Append(encoded_), encoded_.size());
-  }
-
- private:
-  std::shared_ptr<PagedFile> bytes_;
-  std::shared_ptr<PagedSeries<T>> paged_;
-  std::vector<uint8_t> encoded_;
-};
 
 /// A log beyond this size stays on the disk: what is asked for is read again each time. Some 40 s
 /// of 12 joints, which take about 250 MB in memory.
@@ -101,10 +69,6 @@ struct RunRecord {
   /// The run of the scenario's reference variant, for metrics that compare with it; nullptr when
   /// there is none. Not in the log, set by who reads both.
   std::shared_ptr<RunRecord> reference;
-  /// Estimates of the methods that did not run, by estimator_status_t::METHOD_*; nullptr for what
-  /// nobody has asked for. Not in the log, set by who can run the estimator.
-  std::array<std::shared_ptr<const Estimates>, 2> other_estimates;
-
   /// Messages of the graph's channels that have no series above (a module's own), by channel and
   /// encoded, as they were recorded.
   std::map<std::string, Series<std::vector<uint8_t>>, std::less<>> other;

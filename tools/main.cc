@@ -78,7 +78,6 @@ int main(int argc, char** argv) {
   poise::AddBitsCommand(&app, &command);
   poise::AddCompareCommand(&app, &command);
   poise::AddReplayCommand(&app, &command);
-  poise::AddEstimatorsCommand(&app, &command);
   poise::AddLogCommand(&app, &command);
   poise::AddNewCommand(&app, &command);
   poise::AddGraphCommand(&app, &command);

@@ -47,9 +47,6 @@ struct ComponentTraits {
   /// Settings of a run in lockstep beside one in real time, which take back what the latter was
   /// given.
   std::vector<std::string> lockstep = {};
-  /// An estimator reads robot_sensors_t and writes robot_state_t and estimator_status_t: these
-  /// settings choose its methods, as estimator_status_t counts them.
-  std::vector<std::string> methods = {};
   std::vector<DriveLink> drive_links = {};
 };
 

@@ -269,8 +269,7 @@ ComponentType StateEstimatorType() {
       [] { return std::make_unique<StateEstimator>(); },
       // An ideal drive train has no delay and no gears that give.
       {.ideal = {"state_estimator.invariant_ekf.sensor_delay=0",
-                 "state_estimator.invariant_ekf.gear_stiffness=0"},
-       .methods = {"state_estimator.method=ANCHORED_FEET", "state_estimator.method=INVARIANT_EKF"}},
+                 "state_estimator.invariant_ekf.gear_stiffness=0"}},
       {Reads<robot_sensors_t>("robot_sensors"), Writes<robot_state_t>("robot_state"),
        Writes<estimator_status_t>("estimator_status")},
       StateEstimatorConfig::descriptor(),

@@ -229,7 +229,7 @@ def _(task):
 
 @reads("estimation", "With other gears")
 def _(task):
-    metrics = ("invariant_ekf_nees_share", "invariant_ekf_nees_observable_share", "invariant_ekf_position_rms")
+    metrics = ("estimator_nees_share", "estimator_nees_observable_share", "estimator_position_rms")
     stiffness = "sim.drive_train.gear_stiffness"
 
     def make(place, scenario):

@@ -132,9 +132,6 @@ constexpr Needs kNeeds[] = {
     {"estimator_*foot_slip_time", "ESTIMATOR_STATUS.foot_contact"},
     {"estimator_nees*", "ROBOT_STATE; ESTIMATOR_STATUS.covariance; GROUND_TRUTH.base_position"},
     {"estimator_*", "ROBOT_STATE.base_position; GROUND_TRUTH.base_position"},
-    {"anchored_feet_*", "ESTIMATOR_STATUS.method; ROBOT_SENSORS; GROUND_TRUTH.base_position"},
-    {"invariant_ekf_*foot_slip_time", "ESTIMATOR_STATUS.method; ROBOT_SENSORS"},
-    {"invariant_ekf_*", "ESTIMATOR_STATUS.method; ROBOT_SENSORS; GROUND_TRUTH.base_position"},
 };
 
 std::vector<std::string_view> Split(std::string_view text, char separator) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
 #include "logging/metrics/metric_groups.h"
 #include "logging/metrics/metric_needs.h"
@@ -63,6 +64,18 @@ const Metric* FindMetric(std::string_view name) {
   const auto metric =
       std::find_if(metrics.begin(), metrics.end(), [&](const Metric& m) { return m.name == name; });
   return metric == metrics.end() ? nullptr : &*metric;
+}
+
+std::string NoMetric(std::string_view name) {
+  std::vector<std::string> names;
+  for (const Metric& metric : Metrics()) names.push_back(metric.name);
+  std::string hint = Suggest(name, std::move(names));
+  for (const std::string_view former : {"anchored_feet_", "invariant_ekf_"}) {
+    if (!name.starts_with(former)) continue;
+    const std::string now = fmt::format("estimator_{}", name.substr(former.size()));
+    if (FindMetric(now) != nullptr) hint = fmt::format("write {}", now);
+  }
+  return fmt::format("there is no metric '{}'; {}; see `poise list metrics`", name, hint);
 }
 
 }  // namespace poise::logging

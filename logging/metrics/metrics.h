@@ -15,7 +15,6 @@ struct Metric {
   std::string unit;  ///< empty: a number
   std::string description;
   std::function<Answer(const RunRecord& run)> compute;
-  bool needs_other_estimates = false;  ///< RunRecord::other_estimates
   /// The joint that the figure is of; none: it is of no single one.
   std::function<std::string(const RunRecord& run)> joint = {};
   /// What it is computed from: "CHANNEL.field, field", several with ";", those of which one will do
@@ -30,5 +29,7 @@ void AddMetric(Metric metric);
 std::span<const Metric> Metrics();
 /// nullptr when there is none of that name.
 const Metric* FindMetric(std::string_view name);
+/// What to say of a name that no metric has: what it is called now, or what is like it.
+std::string NoMetric(std::string_view name);
 
 }  // namespace poise::logging

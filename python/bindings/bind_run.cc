@@ -99,7 +99,7 @@ Scenario ScenarioOf(const RunStore& run) {
 /// nullopt: the run has no such figure.
 std::optional<double> MetricValue(const RunStore& run, const std::string& name) {
   const logging::Metric* const metric = logging::FindMetric(name);
-  if (metric == nullptr) throw ConfigError(fmt::format("there is no metric '{}'", name));
+  if (metric == nullptr) throw ConfigError(logging::NoMetric(name));
   const py::gil_scoped_release released;
   const std::lock_guard lock(run.record_mutex());
   logging::RunRecord& record = run.record();

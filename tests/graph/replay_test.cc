@@ -80,6 +80,29 @@ TEST_F(ReplayTest, ConfigurationsComeFromTheLog) {
   EXPECT_HAS(result, "first torque[");
 }
 
+// Beside the truth, which a simulation's log has.
+TEST_F(ReplayTest, AnEstimatorsSettingIsTriedOnALog) {
+  RunPoise({"run", "push_double_support", "--inline", "--set", "duration=0.6", "--out", run_});
+  const auto errors = [](const std::string& run) {
+    std::map<std::string, nlohmann::json> measured;
+    const nlohmann::json summary = ReadSummary(run);
+    for (const nlohmann::json& check : summary["checks"]) {
+      measured[check["name"]] = check["measured"];
+    }
+    return measured;
+  };
+  const auto ran = errors(run_);
+  EXPECT_LT(ran.at("estimator_position_rms").get<double>(), 0.2);
+  EXPECT_GT(ran.at("estimator_nees_share").get<double>(), 0.9);
+  // The robot has gears that wind up by up to 0.6 mrad on legs of 0.8 m.
+  const std::string out = folder_ / "rigid_gears";
+  const ProgramResult result =
+      Replay({"--component", "state_estimator", "--set",
+              "state_estimator.invariant_ekf.gear_stiffness=0", "--out", out});
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  EXPECT_GT(errors(out).at("estimator_position_rms"), ran.at("estimator_position_rms"));
+}
+
 TEST_F(ReplayTest, WhatWasReplayedIsARunsFolder) {
   Run({"--inline"});
   const std::string same = folder_ / "same", out = folder_ / "replayed";

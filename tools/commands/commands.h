@@ -27,7 +27,6 @@ void AddReportCommand(CLI::App* app, Command* command);
 void AddBitsCommand(CLI::App* app, Command* command);
 void AddCompareCommand(CLI::App* app, Command* command);
 void AddReplayCommand(CLI::App* app, Command* command);
-void AddEstimatorsCommand(CLI::App* app, Command* command);
 void AddLogCommand(CLI::App* app, Command* command);
 void AddNewCommand(CLI::App* app, Command* command);
 void AddGraphCommand(CLI::App* app, Command* command);

@@ -132,18 +132,13 @@ int ListMetric(const std::string& name) {
     print(*metric);
     return kExitOk;
   }
-  std::vector<std::string> names;
   bool found = false;
   for (const logging::Metric& metric : logging::Metrics()) {
-    names.push_back(metric.name);
     if (metric.name.find(name) == std::string::npos) continue;
     print(metric);
     found = true;
   }
-  if (!found) {
-    throw ConfigError(
-        fmt::format("there is no metric '{}'; {}", name, Suggest(name, std::move(names))));
-  }
+  if (!found) throw ConfigError(logging::NoMetric(name));
   return kExitOk;
 }
 

@@ -155,9 +155,7 @@ const logging::Metric* MetricOfCheck(const Scenario& scenario, int index) {
   const std::string& name = scenario.check(index).metric();
   const logging::Metric* metric = logging::FindMetric(name);
   if (metric != nullptr) return metric;
-  throw ConfigError(
-      fmt::format("check[{}].metric", index),
-      fmt::format("this version has no metric named '{}'; see `poise list metrics`", name));
+  throw ConfigError(fmt::format("check[{}].metric", index), logging::NoMetric(name));
 }
 
 std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging::RunRecord& run) {

@@ -19,7 +19,6 @@
 #include "tools/report/html_report.h"
 #include "tools/report/realtime_verdict.h"
 #include "tools/report/run_screen.h"
-#include "tools/run/estimates.h"
 #include "tools/run/inline_run.h"
 #include "tools/run/launcher.h"
 #include "tools/run/run_dir.h"
@@ -327,9 +326,6 @@ void PrepareRecord(const fs::path& log, const Scenario& scenario, logging::RunRe
     record->reference = std::make_shared<logging::RunRecord>(logging::ReadRun(reference));
     record->reference->first_tick = FirstCheckedTick(scenario, *record->reference);
   }
-  std::vector<const logging::Metric*> metrics;
-  for (int i = 0; i < scenario.check_size(); ++i) metrics.push_back(MetricOfCheck(scenario, i));
-  AddOtherEstimates(metrics, record);
 }
 
 ReportedRun ReadReportedRun(const std::string& run, StageLine* line) {

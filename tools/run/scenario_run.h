@@ -84,9 +84,8 @@ class ScenarioRun {
   std::optional<Part> reference_;
 };
 
-/// Makes a record, read from `log`, ready for the scenario's checks: its first_tick, its reference
-/// if the scenario has one and its log is there, and the estimates of the methods that did not run
-/// if a check is of them. Throws LogError, RobotError or ConfigError.
+/// Makes a record, read from `log`, ready for the scenario's checks: its first_tick, and its
+/// reference if the scenario has one and its log is there. Throws LogError or RobotError.
 void PrepareRecord(const std::filesystem::path& log, const Scenario& scenario,
                    logging::RunRecord* record);
 

@@ -131,13 +131,9 @@ void CheckScenario(const LoadedScenario& loaded) {
     }
     fail("check_from", "must be in [0, duration)");
   }
-  std::vector<std::string> names;
-  for (const logging::Metric& metric : logging::Metrics()) names.push_back(metric.name);
   for (int i = 0; i < s.check_size(); ++i) {
     if (logging::FindMetric(s.check(i).metric()) == nullptr) {
-      fail(fmt::format("check[{}].metric", i),
-           fmt::format("no metric named '{}'; {}; see `poise list metrics`", s.check(i).metric(),
-                       Suggest(s.check(i).metric(), names)));
+      fail(fmt::format("check[{}].metric", i), logging::NoMetric(s.check(i).metric()));
     }
     const auto check_finite = [&](const char* field, double value) {
       if (std::isfinite(value)) return;

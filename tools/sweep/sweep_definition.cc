@@ -400,9 +400,7 @@ void SweepDefinition::SetColumns(const Source& source, const Scenario& scenario)
     } else if (std::find(metrics.begin(), metrics.end(), sweep().column(i)) != metrics.end()) {
       add(sweep().column(i));
     } else {
-      source.Fail({fmt::format("column[{}]", i),
-                   fmt::format("no metric named '{}'; {}; see `poise list metrics`",
-                               sweep().column(i), Suggest(sweep().column(i), metrics))});
+      source.Fail({fmt::format("column[{}]", i), logging::NoMetric(sweep().column(i))});
     }
   }
   if (sweep().column_size() == 0) {

@@ -23,7 +23,6 @@
 #include "tools/cli/text_table.h"
 #include "tools/report/fall_story.h"
 #include "tools/report/report.h"
-#include "tools/run/estimates.h"
 #include "tools/run/run_dir.h"
 #include "tools/run/scenario_run.h"
 #include "tools/scenario/described_components.h"
@@ -187,10 +186,8 @@ SweepRow RunPoint(const std::string& scenario, const RunChanges& changes,
   }
   row.ended_at = run.time(run.num_ticks);
   row.phase = PhaseAtEnd(run);
-  std::vector<const logging::Metric*> measured;
-  for (const std::string& name : metrics) measured.push_back(logging::FindMetric(name));
-  AddOtherEstimates(measured, &run);
-  for (const logging::Metric* metric : measured) {
+  for (const std::string& name : metrics) {
+    const logging::Metric* const metric = logging::FindMetric(name);
     status->Step();
     const logging::Answer value = metric->compute(run);
     if (value && std::isfinite(*value)) row.metrics[metric->name] = *value;

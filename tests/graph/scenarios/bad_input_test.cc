@@ -130,6 +130,8 @@ TEST_F(BadInputTest, AFormerNameIsAnsweredWithTheNewOne) {
                                 "duration: 0.4 assumption { field: "
                                 "\"sim_ode.push\" kind: \"assumed\" }")},
                 {"assumption[0].field", "write sim.push"});
+  file = Changed("metric: \"violated_ticks\"", "metric: \"invariant_ekf_tilt_max\"");
+  ExpectRefused({"run", file}, {Line(), "check[2].metric", "write estimator_tilt_max"});
 }
 
 TEST_F(BadInputTest, TheEngineIsOneThatThereIs) {
@@ -223,10 +225,10 @@ TEST_F(BadInputTest, ANumberThatIsNoneIsNamedWithItsFlag) {
   ExpectUsageError({"sweep", StandScenario(), "--vary", "seed=1:2:2", "--world", "abc"},
                    {"--world: there is no engine 'abc'", "mujoco"});
   ExpectUsageError({"worlds", StandScenario(), "--range", "0:1"}, {"--range: is of a sweep"});
-  // Not a number passes every comparison of a range the wrong way round.
-  ExpectUsageError({"estimators", "--from", "nan"}, {"--from", "nan"});
   for (const char* const flag : {"--inertia", "--damping", "--duration"}) {
     ExpectUsageError({"drives", "emulate", flag, "1e999"}, {flag, "1e999"});
+    // Not a number passes every comparison of a range the wrong way round.
+    ExpectUsageError({"drives", "emulate", flag, "nan"}, {flag, "nan"});
   }
   ExpectUsageError({"drives", "emulate", "--profile", "abc"}, {"'abc'", "elmo_gold"});
   ExpectUsageError({"run", "push", "--inline", "--set", "task_controller.com.kp=200"},
