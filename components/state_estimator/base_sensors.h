@@ -1,4 +1,4 @@
-// What the estimators read.
+// What the estimator reads.
 #pragma once
 
 #include <Eigen/Core>

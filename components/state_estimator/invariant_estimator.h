@@ -44,7 +44,7 @@ class InvariantEstimator {
   const robot::RobotState& state() const { return state_; }
   const BaseCovariance& covariance() const { return base_covariance_; }
   const InvariantFilter& filter() const { return filter_; }
-  /// Share of each foot in what stands, 0..1, as BaseEstimator weighs its anchors.
+  /// Share of each foot in what stands, 0..1, as WeighFeet says.
   const robot::FootArray<double>& foot_weight() const { return foot_weight_; }
   FootContact contact(robot::Foot foot) const;
   /// Squared normalised innovation of the sole's position before the correction; 0 out of contact.

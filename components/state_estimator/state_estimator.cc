@@ -24,11 +24,6 @@ constexpr double kStepCutoff = 60;      // Hz: G1 stands fewer pushes with 80 (d
 constexpr double kLongestDelay = 0.05;  // s
 
 void CheckConfig(const StateEstimatorConfig& config, const robot::RobotModel& model) {
-  if (config.gyro_bias_time_constant() < 4 * config.orientation_time_constant()) {
-    throw ConfigError("gyro_bias_time_constant",
-                      "must be at least four times orientation_time_constant, or the estimate "
-                      "oscillates");
-  }
   if (config.full_load() <= config.light_load()) {
     throw ConfigError("full_load", "must be greater than light_load");
   }
@@ -80,22 +75,16 @@ void StateEstimator::Configure(const ComponentContext& context, Wiring* wiring) 
   wiring->AddStage("estimate", {&robot_sensors_}, {&robot_state_, &estimator_status_},
                    [this](const Tick& tick) { Estimate(tick); });
   last_time_ = MakeTick(0, context.tick_period, context.lead_ticks).time;
-  if (config.method() == StateEstimatorConfig::INVARIANT_EKF) {
-    invariant_ = std::make_unique<InvariantEstimator>(model, config, context.tick_period);
-    estimator_status_->method = estimator_status_t::METHOD_INVARIANT_EKF;
-    estimator_status_->has_covariance = 1;
-  } else {
-    anchored_ = std::make_unique<BaseEstimator>(model, config, context.tick_period);
-    estimator_status_->method = estimator_status_t::METHOD_ANCHORED_FEET;
-  }
+  base_ = std::make_unique<InvariantEstimator>(model, config, context.tick_period);
+  estimator_status_->method = estimator_status_t::METHOD_INVARIANT_EKF;
+  estimator_status_->has_covariance = 1;
 }
 
 bool StateEstimator::Archive(StateArchive* archive) {
   archive->Show(last_time_);
   wrenches_->Archive(archive);
   calibrator_->Archive(archive);
-  if (anchored_) anchored_->Archive(archive);
-  if (invariant_) invariant_->Archive(archive);
+  base_->Archive(archive);
   return true;
 }
 
@@ -125,13 +114,8 @@ void StateEstimator::Estimate(const Tick& tick) {
                           }));
     }
   }
-  if (invariant_) {
-    invariant_->Update(sensors, dt);
-    PublishInvariant();
-  } else {
-    anchored_->Update(sensors, dt);
-    PublishAnchored();
-  }
+  base_->Update(sensors, dt);
+  PublishBase();
   PublishWrenches();
   if (calibrator_->enabled()) PublishCalibration();
 }
@@ -139,13 +123,8 @@ void StateEstimator::Estimate(const Tick& tick) {
 // What the estimator knows of the IMU's errors by now.
 ObserverCorrection StateEstimator::Correction() const {
   ObserverCorrection correction;
-  if (invariant_) {
-    correction.gyro_bias = invariant_->filter().state().gyro_bias;
-    correction.accelerometer_bias = invariant_->filter().state().accelerometer_bias;
-  } else {
-    correction.gyro_bias = anchored_->gyro_bias();
-    correction.accelerometer_bias = anchored_->accelerometer_bias();
-  }
+  correction.gyro_bias = base_->filter().state().gyro_bias;
+  correction.accelerometer_bias = base_->filter().state().accelerometer_bias;
   correction.load_mass = calibrator_->load()[0];
   correction.load_moment = calibrator_->load().tail<3>();
   return correction;
@@ -200,7 +179,8 @@ void StateEstimator::PublishCalibration() {
   }
 }
 
-void StateEstimator::PublishState(const robot::RobotState& state) {
+void StateEstimator::PublishBase() {
+  const robot::RobotState& state = base_->state();
   robot_state_t& out = *robot_state_;
   SetVector3(state.base_position, out.base_position);
   SetQuaternion(state.base_orientation, out.base_orientation);
@@ -208,31 +188,13 @@ void StateEstimator::PublishState(const robot::RobotState& state) {
   SetVector3(state.base_angular_velocity, out.base_angular_velocity);
   std::copy_n(state.joint_position.data(), state.joint_position.size(), out.joint_position.data());
   std::copy_n(state.joint_velocity.data(), state.joint_velocity.size(), out.joint_velocity.data());
-}
-
-void StateEstimator::PublishAnchored() {
-  PublishState(anchored_->state());
-  std::ranges::copy(anchored_->foot_weight(), robot_state_->foot_load_share.begin());
-  SetVector3(anchored_->gyro_bias(), robot_state_->imu_bias_angular_velocity);
+  std::ranges::copy(base_->foot_weight(), out.foot_load_share.begin());
+  const InvariantState& biases = base_->filter().state();
+  SetVector3(biases.gyro_bias, out.imu_bias_angular_velocity);
   estimator_status_t& status = *estimator_status_;
-  SetVector3(anchored_->gyro_bias(), status.imu_bias_angular_velocity);
-  for (const Foot f : kFeet) {
-    const size_t i = Index(f);
-    status.foot_contact[i] = anchored_->foot_weight()[f] > 0 ? estimator_status_t::CONTACT_FIRM
-                                                             : estimator_status_t::CONTACT_NONE;
-    SetPose(anchored_->anchor(f), &status.foot_pose[i]);
-  }
-}
-
-void StateEstimator::PublishInvariant() {
-  PublishState(invariant_->state());
-  const InvariantState& state = invariant_->filter().state();
-  std::ranges::copy(invariant_->foot_weight(), robot_state_->foot_load_share.begin());
-  SetVector3(state.gyro_bias, robot_state_->imu_bias_angular_velocity);
-  estimator_status_t& status = *estimator_status_;
-  SetVector3(state.gyro_bias, status.imu_bias_angular_velocity);
-  SetVector3(state.accelerometer_bias, status.imu_bias_acceleration);
-  const InvariantEstimator::BaseCovariance& covariance = invariant_->covariance();
+  SetVector3(biases.gyro_bias, status.imu_bias_angular_velocity);
+  SetVector3(biases.accelerometer_bias, status.imu_bias_acceleration);
+  const InvariantEstimator::BaseCovariance& covariance = base_->covariance();
   size_t next = 0;
   for (int row = 0; row < 9; ++row) {
     for (int column = row; column < 9; ++column) {
@@ -241,7 +203,7 @@ void StateEstimator::PublishInvariant() {
   }
   for (const Foot f : kFeet) {
     const size_t i = Index(f);
-    switch (invariant_->contact(f)) {
+    switch (base_->contact(f)) {
       case FootContact::kNone:
         status.foot_contact[i] = estimator_status_t::CONTACT_NONE;
         break;
@@ -252,28 +214,22 @@ void StateEstimator::PublishInvariant() {
         status.foot_contact[i] = estimator_status_t::CONTACT_SLIPPING;
         break;
     }
-    status.foot_innovation[i] = invariant_->innovation(f);
-    SetPose(invariant_->foot_pose(f), &status.foot_pose[i]);
+    status.foot_innovation[i] = base_->innovation(f);
+    SetPose(base_->foot_pose(f), &status.foot_pose[i]);
   }
 }
 
 ComponentType StateEstimatorType() {
-  // The message counts the methods as the configuration does.
-  static_assert(int{estimator_status_t::METHOD_ANCHORED_FEET} ==
-                StateEstimatorConfig::ANCHORED_FEET);
-  static_assert(int{estimator_status_t::METHOD_INVARIANT_EKF} ==
-                StateEstimatorConfig::INVARIANT_EKF);
-  return {
-      "state_estimator",
-      "floating base and joint velocities from IMU, encoders and feet",
-      [] { return std::make_unique<StateEstimator>(); },
-      // An ideal drive train has no delay and no gears that give.
-      {.ideal = {"state_estimator.invariant_ekf.sensor_delay=0",
-                 "state_estimator.invariant_ekf.gear_stiffness=0"}},
-      {Reads<robot_sensors_t>("robot_sensors"), Writes<robot_state_t>("robot_state"),
-       Writes<estimator_status_t>("estimator_status")},
-      StateEstimatorConfig::descriptor(),
-      state_estimator_proto_schema};
+  return {"state_estimator",
+          "floating base and joint velocities from IMU, encoders and feet",
+          [] { return std::make_unique<StateEstimator>(); },
+          // An ideal drive train has no delay and no gears that give.
+          {.ideal = {"state_estimator.invariant_ekf.sensor_delay=0",
+                     "state_estimator.invariant_ekf.gear_stiffness=0"}},
+          {Reads<robot_sensors_t>("robot_sensors"), Writes<robot_state_t>("robot_state"),
+           Writes<estimator_status_t>("estimator_status")},
+          StateEstimatorConfig::descriptor(),
+          state_estimator_proto_schema};
 }
 
 }  // namespace poise

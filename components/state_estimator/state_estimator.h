@@ -4,7 +4,6 @@
 #include <memory>
 
 #include "components/framework/component.h"
-#include "components/state_estimator/base_estimator.h"
 #include "components/state_estimator/calibrator.h"
 #include "components/state_estimator/foot_wrenches.h"
 #include "components/state_estimator/invariant_estimator.h"
@@ -26,16 +25,12 @@ class StateEstimator : public Component {
   ObserverCorrection Correction() const;
   void PublishWrenches();
   void PublishCalibration();
-  void PublishState(const robot::RobotState& state);
-  void PublishAnchored();
-  void PublishInvariant();
+  void PublishBase();
 
   Input<robot_sensors_t> robot_sensors_;
   Output<robot_state_t> robot_state_;
   Output<estimator_status_t> estimator_status_;
-  // The method's; the other is null.
-  std::unique_ptr<BaseEstimator> anchored_;
-  std::unique_ptr<InvariantEstimator> invariant_;
+  std::unique_ptr<InvariantEstimator> base_;
   std::unique_ptr<FootWrenches> wrenches_;
   std::unique_ptr<Calibrator> calibrator_;
   double last_time_ = 0;

@@ -92,7 +92,7 @@ std::vector<std::string> ElementNamesOf(const RunStore& run, const std::string& 
 
 Scenario ScenarioOf(const RunStore& run) {
   Scenario scenario;
-  ParseScenario(run.scenario(), "the run's scenario", &scenario);
+  ParseLoggedScenario(run.scenario(), "the run's scenario", &scenario);
   return scenario;
 }
 

@@ -61,8 +61,8 @@ const std::vector<robot_sensors_t>* Sensors(const robot::RobotModel& model, bool
 }
 
 // The whole tick, the clock read at its ends only.
-void Tick(benchmark::State& state, const std::string& robot, bool both, const char* method) {
-  ControlTick control(robot, ContactsFor(both), method);
+void Tick(benchmark::State& state, const std::string& robot, bool both) {
+  ControlTick control(robot, ContactsFor(both));
   const auto* sensors = Sensors(control.model(), both, &state);
   if (sensors == nullptr) return;
   Samples total("tick");
@@ -86,9 +86,9 @@ void Tick(benchmark::State& state, const std::string& robot, bool both, const ch
 
 // The same with the clock read between the stages; the shared dynamics are asked for first, so that
 // no stage pays for them.
-void Split(benchmark::State& state, const std::string& robot, bool both, const char* method) {
+void Split(benchmark::State& state, const std::string& robot, bool both) {
   const Contacts in_contact = ContactsFor(both);
-  ControlTick control(robot, in_contact, method);
+  ControlTick control(robot, in_contact);
   const auto* sensors = Sensors(control.model(), both, &state);
   if (sensors == nullptr) return;
   robot::RobotState estimated(control.model().num_joints());
@@ -137,23 +137,17 @@ void Split(benchmark::State& state, const std::string& robot, bool both, const c
   }
 }
 
-constexpr const char* kAnchoredFeet = "method: ANCHORED_FEET";
-constexpr const char* kInvariantEkf = "method: INVARIANT_EKF";  // delay and gears: the robot's
-
 void Register(const std::string& name, const std::string& robot) {
   for (const bool split : {false, true}) {
     for (const bool both : {true, false}) {
-      for (const char* method : {kAnchoredFeet, kInvariantEkf}) {
-        const std::string title = std::string(split ? "Split/" : "Tick/") + name +
-                                  (both ? "_double" : "_single") +
-                                  (method == kInvariantEkf ? "_ekf" : "");
-        benchmark::RegisterBenchmark(
-            title.c_str(),
-            [=](benchmark::State& state) { (split ? Split : Tick)(state, robot, both, method); })
-            ->Iterations(kNumStates)
-            ->UseManualTime()
-            ->Unit(benchmark::kMicrosecond);
-      }
+      const std::string title =
+          std::string(split ? "Split/" : "Tick/") + name + (both ? "_double" : "_single");
+      benchmark::RegisterBenchmark(
+          title.c_str(),
+          [=](benchmark::State& state) { (split ? Split : Tick)(state, robot, both); })
+          ->Iterations(kNumStates)
+          ->UseManualTime()
+          ->Unit(benchmark::kMicrosecond);
     }
   }
 }

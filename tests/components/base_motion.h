@@ -8,7 +8,7 @@
 #include <string>
 
 #include "components/robot/dynamics.h"
-#include "components/state_estimator/base_estimator.h"
+#include "components/state_estimator/base_sensors.h"
 #include "tests/test_seed.h"
 
 namespace poise {

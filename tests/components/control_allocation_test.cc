@@ -45,7 +45,7 @@ class ControlAllocation : public testing::TestWithParam<Case> {};
 TEST_P(ControlAllocation, NoneInAThousandTicks) {
   const std::filesystem::path robot = FileOf(GetParam());
   if (robot.empty()) GTEST_SKIP() << GetParam().maker << " is not in $POISE_ROBOTS";
-  ControlTick control(robot.string(), GetParam().in_contact, "",
+  ControlTick control(robot.string(), GetParam().in_contact,
                       "friction_compensation { share: 0.8 }");
   const auto sensors = SwayingSensors(control.model(), GetParam().in_contact, 1000);
   int balancing = 0;

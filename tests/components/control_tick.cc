@@ -107,9 +107,9 @@ std::vector<robot_sensors_t> SwayingSensors(const robot::RobotModel& model,
 }
 
 ControlTick::ControlTick(const std::string& robot_path, const Contacts& in_contact,
-                         const std::string& estimator, const std::string& redistributor)
+                         const std::string& redistributor)
     : context_(robot_path),
-      estimator_(&context_, estimator),
+      estimator_(&context_, ""),
       planner_(&context_, std::string("phase { support: ") +
                               (in_contact[0] && in_contact[1] ? "DOUBLE" : "RIGHT") + " }"),
       task_(&context_, TaskControllerText()),

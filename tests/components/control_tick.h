@@ -26,12 +26,11 @@ std::vector<robot_sensors_t> SwayingSensors(const robot::RobotModel& model,
 /// The five components as the inline runner calls them, with one WholeBody between them.
 class ControlTick {
  public:
-  /// `estimator`: StateEstimatorConfig.
-  ControlTick(robot::TestRobot robot, const Contacts& in_contact, const std::string& estimator = "")
-      : ControlTick(robot::RobotPath(robot), in_contact, estimator) {}
+  ControlTick(robot::TestRobot robot, const Contacts& in_contact)
+      : ControlTick(robot::RobotPath(robot), in_contact) {}
   /// `robot_path`: a Robot file. `redistributor`: RedistributorConfig beyond the paper's limits.
   ControlTick(const std::string& robot_path, const Contacts& in_contact,
-              const std::string& estimator = "", const std::string& redistributor = "");
+              const std::string& redistributor = "");
 
   void Estimate(const robot_sensors_t& sensors, const Tick& tick);
   void Plan(const Tick& tick) { planner_.Run(tick); }

@@ -60,7 +60,7 @@ void PrintRun(const logging::LogSurvey& survey) {
              survey.first_tick, spec.num_ticks());
   try {
     Scenario scenario;
-    ParseScenario(survey.info.scenario, "RUN_INFO.scenario", &scenario);
+    ParseLoggedScenario(survey.info.scenario, "RUN_INFO.scenario", &scenario);
     const std::string changes = FormatChanges(scenario);
     if (!changes.empty()) fmt::print("changed   {}\n", logging::LinesForTerminal(changes));
   } catch (const ConfigError& error) {

@@ -133,7 +133,7 @@ void WriteRun(const ReplayOptions& options, const std::string& log, const fs::pa
   *run_spec.mutable_config() = spec.config();
   google::protobuf::TextFormat::PrintToString(run_spec, &info.run_spec);
   Scenario scenario;
-  ParseScenario(info.scenario, log + ": RUN_INFO.scenario", &scenario);
+  ParseLoggedScenario(info.scenario, log + ": RUN_INFO.scenario", &scenario);
   for (const std::string& set : options.set) {
     const size_t equals = set.find('=');
     SetField(&scenario, set.substr(0, equals), set.substr(equals + 1));

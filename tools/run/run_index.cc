@@ -27,7 +27,7 @@ std::vector<std::string> FlagsOf(const RunSpec& spec, const fs::path& dir) {
   const std::string file = (dir / "scenario.pbtxt").string();
   Scenario scenario;
   try {
-    ParseScenario(ReadFile(file), file, &scenario);
+    ParseLoggedScenario(ReadFile(file), file, &scenario);
   } catch (const ConfigError&) {  // another version's: the run is listed all the same
   }
   const Applied& applied = scenario.applied();

@@ -341,7 +341,8 @@ ReportedRun ReadReportedRun(const std::string& run, StageLine* line) {
                     "scenario's text there",
                     result.log));
   }
-  ParseScenario(result.record.info.scenario, result.log + ": RUN_INFO.scenario", &result.scenario);
+  ParseLoggedScenario(result.record.info.scenario, result.log + ": RUN_INFO.scenario",
+                      &result.scenario);
   line->Begin("figures of the table");
   PrepareRecord(result.log, result.scenario, &result.record);
   if (result.scenario.has_reference() && result.record.reference == nullptr) {

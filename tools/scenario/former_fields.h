@@ -1,4 +1,4 @@
-// Names that fields of a scenario had before.
+// Fields that a scenario had before.
 #pragma once
 
 #include <string>
@@ -8,11 +8,13 @@
 
 namespace poise {
 
-/// What to write in place of the former path `path` ("sim_ode.push[0].peak"): "write
-/// sim.push[0].peak". Empty when it is none.
+/// What to do about the former path `path` ("sim_ode.push[0].peak"): "write sim.push[0].peak".
+/// Empty when it is none.
 std::string FormerField(std::string_view path);
 
-/// ParseTextProto of a scenario: its error says what to write in place of a former name.
+/// ParseTextProto of a scenario: its error says what to do about a former name.
 void ParseScenario(std::string_view text, std::string_view source, Scenario* scenario);
+/// Likewise of a run that has been: fields that went with what they were of are passed over.
+void ParseLoggedScenario(std::string_view text, std::string_view source, Scenario* scenario);
 
 }  // namespace poise

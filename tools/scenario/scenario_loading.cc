@@ -209,7 +209,7 @@ void ApplyChange(const FieldChange& change, LoadedScenario* loaded) {
     SetField(&loaded->scenario, path, value);
   } catch (const ConfigError& error) {
     if (const std::string former = FormerField(path); !former.empty()) {
-      throw ConfigError(Describe(*loaded, change, path, "has another name now; " + former));
+      throw ConfigError(Describe(*loaded, change, path, "is no field any more; " + former));
     }
     const bool wrong_value = error.problem().starts_with(fmt::format("'{}' is not ", value));
     const std::string hint = wrong_value ? UnitHint(path, value) : "";

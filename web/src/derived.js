@@ -160,10 +160,9 @@ function estimatorSignals(run) {
         const a = rotate(conjugate(q.slice(0, 4)), up), b = rotate(conjugate(q.slice(4)), up);
         return 2 * Math.asin(Math.min(1, Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) / 2));
       })},
-    ...(run.scenario.state_estimator?.method === 'INVARIANT_EKF' ? [
-      threeSigma('base_position_bound', 'm', 'base\'s position', 6, 7, 8),
-      threeSigma('base_velocity_bound', 'm/s', 'base\'s velocity', 3, 4, 5),
-      threeSigma('base_tilt_bound', 'rad', 'base\'s tilt', 0, 1)] : []),
+    threeSigma('base_position_bound', 'm', 'base\'s position', 6, 7, 8),
+    threeSigma('base_velocity_bound', 'm/s', 'base\'s velocity', 3, 4, 5),
+    threeSigma('base_tilt_bound', 'rad', 'base\'s tilt', 0, 1),
   ];
 }
 

@@ -24,6 +24,7 @@ namespace {
 /// Keeps the first error: later ones are mostly its consequences.
 class FirstError final : public google::protobuf::io::ErrorCollector {
  public:
+  explicit FirstError(bool (*passes_over)(std::string_view)) : passes_over_(passes_over) {}
   void AddError(int line, google::protobuf::io::ColumnNumber column,
                 const std::string& message) override {
     if (any_) return;
@@ -31,6 +32,11 @@ class FirstError final : public google::protobuf::io::ErrorCollector {
     line_ = line;
     column_ = column;
     message_ = message;
+  }
+  /// The parser warns of a field that there is not where it may pass it over.
+  void AddWarning(int line, google::protobuf::io::ColumnNumber column,
+                  const std::string& message) override {
+    if (passes_over_ != nullptr && !passes_over_(message)) AddError(line, column, message);
   }
   bool any() const { return any_; }
   std::string Describe(std::string_view source) const {
@@ -60,6 +66,7 @@ class FirstError final : public google::protobuf::io::ErrorCollector {
     return text.empty() ? "" : fmt::format(" Did you mean {}?", text);
   }
 
+  bool (*passes_over_)(std::string_view);
   bool any_ = false;
   int line_ = -1;
   int column_ = 0;
@@ -69,11 +76,13 @@ class FirstError final : public google::protobuf::io::ErrorCollector {
 }  // namespace
 
 void ParseTextProto(std::string_view text, std::string_view source,
-                    google::protobuf::Message* message) {
-  FirstError errors;
+                    google::protobuf::Message* message,
+                    bool (*passes_over)(std::string_view complaint)) {
+  FirstError errors(passes_over);
   google::protobuf::TextFormat::Parser parser;
   parser.RecordErrorsTo(&errors);
   parser.SetFinder(AddedFieldFinder());
+  parser.AllowUnknownField(passes_over != nullptr);
   const std::string prepared = WithBrackets(text, *message->GetDescriptor());
   google::protobuf::io::ArrayInputStream stream(prepared.data(), static_cast<int>(prepared.size()));
   if (!parser.Parse(&stream, message) || errors.any()) throw ConfigError(errors.Describe(source));

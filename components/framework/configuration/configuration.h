@@ -12,10 +12,11 @@ class Message;
 
 namespace poise {
 
-/// Parses protobuf text. Throws ConfigError "source:line:column: problem"; unknown fields and enum
-/// values are errors.
+/// Parses protobuf text. Throws ConfigError "source:line:column: problem"; enum values that there
+/// are not are errors, and so are fields, but those of whose complaint `passes_over` is true.
 void ParseTextProto(std::string_view text, std::string_view source,
-                    google::protobuf::Message* message);
+                    google::protobuf::Message* message,
+                    bool (*passes_over)(std::string_view complaint) = nullptr);
 
 /// Reads and parses a file. Throws ConfigError when it cannot be read.
 void ReadTextProto(const std::string& path, google::protobuf::Message* message);

@@ -9,6 +9,7 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "tests/graph/poise_program.h"
+#include "tools/scenario/former_fields.h"
 
 namespace poise {
 namespace {
@@ -130,6 +131,13 @@ TEST_F(BadInputTest, AFormerNameIsAnsweredWithTheNewOne) {
                                 "duration: 0.4 assumption { field: "
                                 "\"sim_ode.push\" kind: \"assumed\" }")},
                 {"assumption[0].field", "write sim.push"});
+  file = Changed("sim {", "state_estimator { method: INVARIANT_EKF } sim {");
+  ExpectRefused({"run", file}, {Line(), "method", "leave it out"});
+  Scenario logged;  // of a run that has been such a field is passed over
+  ParseLoggedScenario(ReadFile(file), file, &logged);
+  EXPECT_TRUE(logged.has_sim());
+  ExpectRefused({"run", StandScenario(), "--set", "state_estimator.method=INVARIANT_EKF"},
+                {"--set state_estimator.method", "leave it out"});
   file = Changed("metric: \"violated_ticks\"", "metric: \"invariant_ekf_tilt_max\"");
   ExpectRefused({"run", file}, {Line(), "check[2].metric", "write estimator_tilt_max"});
 }
