@@ -1,28 +1,15 @@
 #include "logging/log_survey.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "components/framework/run.h"
 #include "fmt/format.h"
+#include "logging/message_scalars.h"
 #include "logging/printable.h"
 #include "logging/run_record.h"
 
 namespace poise::logging {
 namespace {
-
-class FiniteCheck final : public ScalarVisitor {
- public:
-  void Integer(std::string_view, int64_t) override {}
-  void Real(std::string_view, double value) override { finite = finite && std::isfinite(value); }
-  void Text(std::string_view, std::string_view) override {}
-  bool finite = true;
-};
-
-bool Usable(const MessageType& type, std::span<const uint8_t> data) {
-  FiniteCheck check;
-  return type.visit(data.data(), static_cast<int64_t>(data.size()), &check) && check.finite;
-}
 
 /// Sorts a log's events to their channels.
 class Surveyor {
@@ -93,7 +80,7 @@ class Surveyor {
     const MessageType& type = ChannelType(*lanes_[index].channel);
     channel.bytes += static_cast<int64_t>(event.data.size());
     if (channel.external) {
-      const bool good = Usable(type, event.data) &&
+      const bool good = AllFinite(type, event.data) &&
                         ReadInt64(event.data.data() + type.run_id_offset) == survey_.spec.run_id();
       ++(good ? channel.ticks.messages : channel.ticks.refused);
       if (!good) channel.refused_at.push_back(event.offset);
@@ -101,7 +88,7 @@ class Surveyor {
     }
     const int64_t refused = ticks.refused();
     const std::optional<int64_t> tick = ticks.Check(event.data);
-    if (tick && Usable(type, event.data)) {
+    if (tick && AllFinite(type, event.data)) {
       ticks.Take(*tick);
     } else if (tick) {
       ticks.Refuse();
@@ -116,7 +103,7 @@ class Surveyor {
     other.bytes += static_cast<int64_t>(event.data.size());
     const MessageType* type =
         event.data.size() < 8 ? nullptr : FindMessageType(ReadInt64(event.data.data()));
-    if (type == nullptr || !type->has_header || !Usable(*type, event.data)) {
+    if (type == nullptr || !type->has_header || !AllFinite(*type, event.data)) {
       ++other.ticks.refused;
       other.refused_at.push_back(event.offset);
       return {};

@@ -1,7 +1,6 @@
 #include "logging/run_record.h"
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
 
 #include "components/framework/bus/packet_filter.h"
@@ -9,6 +8,7 @@
 #include "components/framework/run.h"
 #include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
+#include "logging/message_scalars.h"
 #include "operate/message_traits.hpp"
 #include "poise/message_traits.hpp"
 
@@ -81,18 +81,7 @@ class Store {
            MessageTraits<T>::AllFinite(*message);
   }
   static bool IsReadable(const MessageType* type, std::span<const uint8_t> data) {
-    class Nothing final : public ScalarVisitor {
-     public:
-      void Integer(std::string_view, int64_t) override {}
-      void Real(std::string_view, double value) override {
-        finite = finite && std::isfinite(value);
-      }
-      void Text(std::string_view, std::string_view) override {}
-      bool finite = true;
-    };
-    Nothing values;
-    return type != nullptr &&
-           type->visit(data.data(), static_cast<int64_t>(data.size()), &values) && values.finite;
+    return type != nullptr && AllFinite(*type, data);
   }
 
   std::shared_ptr<PagedFile> log_;

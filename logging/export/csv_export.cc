@@ -15,6 +15,7 @@
 #include "lcmtypes/field_table.h"
 #include "logging/export/log_export.h"
 #include "logging/log_messages.h"
+#include "logging/message_scalars.h"
 #include "logging/paged_file.h"
 #include "logging/partial_file.h"
 
@@ -38,11 +39,13 @@ void AppendText(std::string_view text, std::string* row) {
   row->push_back('"');
 }
 
-/// Values and names of a message's fields; counts and header are left out.
+/// How many scalars stand before a message's own: counts and header.
+size_t HeaderScalars(const MessageType& type) { return type.count_names.size() + 3; }
+
+/// Values of a message's fields; counts and header are left out.
 class Row final : public ScalarVisitor {
  public:
-  explicit Row(const MessageType& type, std::string* to)
-      : skip_(type.count_names.size() + 3), to_(to) {}
+  explicit Row(const MessageType& type, std::string* to) : skip_(HeaderScalars(type)), to_(to) {}
 
   void Integer(std::string_view, int64_t value) override {
     if (Begin()) fmt::format_to(std::back_inserter(*to_), "{}", value);
@@ -65,25 +68,6 @@ class Row final : public ScalarVisitor {
   size_t skip_;
   std::string* to_;
   size_t seen_ = 0;
-};
-
-/// Paths of a message's fields, counts and header left out.
-class Paths final : public ScalarVisitor {
- public:
-  explicit Paths(const MessageType& type) : skip_(type.count_names.size() + 3) {}
-  void Integer(std::string_view path, int64_t) override { Add(path); }
-  void Real(std::string_view path, double) override { Add(path); }
-  void Text(std::string_view path, std::string_view) override { Add(path); }
-  const std::vector<std::string>& paths() const { return paths_; }
-
- private:
-  void Add(std::string_view path) {
-    if (seen_++ >= skip_) paths_.emplace_back(path);
-  }
-
-  size_t skip_;
-  size_t seen_ = 0;
-  std::vector<std::string> paths_;
 };
 
 /// One file, there when Close has checked what is written.
@@ -136,14 +120,15 @@ void AppendValues(const MessageType& type, std::span<const uint8_t> data, std::s
 size_t AppendNames(const MessageType& type, std::span<const uint8_t> data,
                    const ElementNames& elements, const std::string& prefix, std::string* to,
                    Json* units) {
-  Paths paths(type);
-  type.visit(data.data(), static_cast<int64_t>(data.size()), &paths);
-  for (const std::string& path : paths.paths()) {
+  const std::vector<MessageScalar> scalars = ScalarsOf(type, data).value();
+  const size_t skip = HeaderScalars(type);
+  for (size_t i = skip; i < scalars.size(); ++i) {
+    const std::string& path = scalars[i].path;
     const std::string name = prefix + elements.Label(type.name, path);
     to->append(",").append(name);
     (*units)[name] = UnitOf(type.name, path);
   }
-  return paths.paths().size();
+  return scalars.size() - skip;
 }
 
 Json TimeUnits() { return {{"time", "s"}, {"tick", ""}}; }

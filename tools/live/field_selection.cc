@@ -6,24 +6,11 @@
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
+#include "logging/message_scalars.h"
 #include "tools/reference/value_names.h"
 
 namespace poise {
 namespace {
-
-class Collect final : public ScalarVisitor {
- public:
-  void Integer(std::string_view path, int64_t value) override {
-    scalars.push_back({std::string(path), value, {}});
-  }
-  void Real(std::string_view path, double value) override {
-    scalars.push_back({std::string(path), value, {}});
-  }
-  void Text(std::string_view path, std::string_view value) override {
-    scalars.push_back({std::string(path), std::string(value), {}});
-  }
-  std::vector<Scalar> scalars;
-};
 
 /// True when `path` is `field` or lies inside it.
 bool Inside(std::string_view path, std::string_view field) {
@@ -100,15 +87,15 @@ std::string Problem(const MessageType& type, const std::vector<Scalar>& scalars,
 std::optional<std::vector<Scalar>> ReadScalars(const MessageType& type,
                                                std::span<const uint8_t> data,
                                                const logging::ElementNames& names) {
-  Collect collect;
-  if (!type.visit(data.data(), static_cast<int64_t>(data.size()), &collect)) return std::nullopt;
-  for (Scalar& scalar : collect.scalars) {
-    if (const int64_t* const value = std::get_if<int64_t>(&scalar.value)) {
-      scalar.name = ValueName(type.name, scalar.path, *value);
-    }
-    scalar.path = names.Label(type.name, scalar.path);
+  std::optional<std::vector<logging::MessageScalar>> read = logging::ScalarsOf(type, data);
+  if (!read) return std::nullopt;
+  std::vector<Scalar> scalars;
+  for (auto& [path, value] : *read) {
+    const int64_t* const number = std::get_if<int64_t>(&value);
+    scalars.push_back({names.Label(type.name, path), value,
+                       number == nullptr ? "" : ValueName(type.name, path, *number)});
   }
-  return std::move(collect.scalars);
+  return scalars;
 }
 
 std::vector<uint8_t> ZeroMessage(const MessageType& type, std::span<const int32_t> counts) {
