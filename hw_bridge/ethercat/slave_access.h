@@ -25,17 +25,6 @@ class SdoAbortError : public EthercatError {
   uint32_t code_;
 };
 
-/// What SDO information says of an object.
-struct ObjectDescription {
-  uint16_t index = 0, data_type = 0;
-  uint8_t max_subindex = 0, code = 0;  ///< 7: a variable, 8: an array, 9: a record
-  std::string name;
-};
-struct EntryDescription {
-  uint16_t data_type = 0, bits = 0, access = 0;
-  std::string name;
-};
-
 /// Acyclic access to one slave. Everything that fails throws EthercatError naming the slave, what
 /// was asked of it and what it answered.
 class SlaveAccess : public SlaveRegisters {
@@ -60,10 +49,6 @@ class SlaveAccess : public SlaveRegisters {
   void Download(ObjectAddress object, uint32_t value, uint8_t size);
   /// Expedited, normal or segmented, as `data` are long. Precondition: not empty.
   void DownloadBytes(ObjectAddress object, std::span<const uint8_t> data, bool complete = false);
-  /// SDO information: the indices of all objects (`list` 1), of those that can be mapped (2, 3).
-  std::vector<uint16_t> ListObjects(uint16_t list = 1);
-  ObjectDescription DescribeObject(uint16_t index);
-  EntryDescription DescribeEntry(ObjectAddress object);
   /// Takes a message that waits in the mailbox, if there is one, without waiting for any.
   void PollMailbox();
   /// The last emergency message met in the mailbox; code 0: none.
@@ -75,9 +60,6 @@ class SlaveAccess : public SlaveRegisters {
   Sdo Exchange(const Sdo& request, const std::string& what);
   /// The next CoE message that is no emergency, which is kept.
   CoeMessage ReceiveCoe(int64_t deadline, const std::string& what);
-  /// Header and payload of all fragments of the answer to an information request.
-  std::vector<uint8_t> ExchangeInfo(InfoOpcode request, std::span<const uint8_t> data,
-                                    const std::string& what);
   /// What the mailbox holds, when it is CoE and new; an emergency is kept and none is returned.
   std::optional<CoeMessage> TakeReceived(const std::string& what);
   void SendMailbox(std::span<uint8_t> mailbox, int64_t deadline, const std::string& what);
