@@ -115,4 +115,46 @@ void PartialFile::OnSignal(int signal) {
   raise(signal);  // delivered as this returns
 }
 
+CheckedFile::CheckedFile(const std::string& path) : path_(path), file_(path) {
+  if (buffer_.open(file_.part(), std::ios::out | std::ios::binary) == nullptr) Fail();
+}
+
+void CheckedFile::Write(std::string_view bytes) {
+  stream_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  if (!stream_) Fail();
+}
+
+void CheckedFile::Close() {
+  stream_.flush();
+  if (!stream_ || buffer_.close() == nullptr) Fail();
+  file_.Keep();
+}
+
+void CheckedFile::Fail() const {
+  const int problem = buffer_.problem() != 0 ? buffer_.problem() : errno;
+  throw LogError(fmt::format("{}: cannot be written: {}", path_, std::strerror(problem)));
+}
+
+CheckedFile::Buffer::int_type CheckedFile::Buffer::overflow(int_type c) {
+  const int_type result = std::filebuf::overflow(c);
+  if (result == traits_type::eof()) Note();
+  return result;
+}
+
+std::streamsize CheckedFile::Buffer::xsputn(const char* data, std::streamsize size) {
+  const std::streamsize written = std::filebuf::xsputn(data, size);
+  if (written != size) Note();
+  return written;
+}
+
+int CheckedFile::Buffer::sync() {
+  const int result = std::filebuf::sync();
+  if (result != 0) Note();
+  return result;
+}
+
+void CheckedFile::Buffer::Note() {
+  if (problem_ == 0) problem_ = errno;
+}
+
 }  // namespace poise::logging

@@ -1,7 +1,10 @@
 // Files that are there whole or not at all.
 #pragma once
 
+#include <fstream>
+#include <ostream>
 #include <string>
+#include <string_view>
 
 namespace poise::logging {
 
@@ -31,6 +34,41 @@ class PartialFile {
   std::string part_;
   bool pending_ = false;         // the part is there and is not the file itself
   PartialFile* next_ = nullptr;  // of the list that the signal handler goes through
+};
+
+/// A PartialFile and the stream that writes it, which remembers why its first write failed.
+class CheckedFile {
+ public:
+  /// Throws LogError, also for what PartialFile refuses.
+  explicit CheckedFile(const std::string& path);
+
+  /// Failures show at Close.
+  std::ostream* stream() { return &stream_; }
+  /// Throws LogError.
+  void Write(std::string_view bytes);
+  /// The file is there from here on. Throws LogError when a write has failed.
+  void Close();
+
+ private:
+  class Buffer final : public std::filebuf {
+   public:
+    int problem() const { return problem_; }
+
+   protected:
+    int_type overflow(int_type c) override;
+    std::streamsize xsputn(const char* data, std::streamsize size) override;
+    int sync() override;
+
+   private:
+    void Note();
+    int problem_ = 0;  // errno: later calls change it
+  };
+  [[noreturn]] void Fail() const;
+
+  std::string path_;
+  PartialFile file_;
+  Buffer buffer_;
+  std::ostream stream_{&buffer_};
 };
 
 }  // namespace poise::logging

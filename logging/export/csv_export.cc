@@ -1,8 +1,6 @@
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -70,36 +68,6 @@ class Row final : public ScalarVisitor {
   size_t seen_ = 0;
 };
 
-/// One file, there when Close has checked what is written.
-class File {
- public:
-  explicit File(const std::string& path)
-      : path_(path), file_(path), out_(file_.part(), std::ios::binary) {
-    if (!out_) throw LogError(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
-  }
-  void Write(const std::string& text) {
-    out_.write(text.data(), static_cast<std::streamsize>(text.size()));
-    NoteError();
-  }
-  void Close() {
-    out_.close();
-    NoteError();
-    if (!out_) throw LogError(fmt::format("{}: writing failed: {}", path_, std::strerror(error_)));
-    file_.Keep();
-  }
-
- private:
-  /// Later calls change errno.
-  void NoteError() {
-    if (!out_ && error_ == 0) error_ = errno;
-  }
-
-  std::string path_;
-  PartialFile file_;
-  std::ofstream out_;
-  int error_ = 0;  // errno of the first failure
-};
-
 /// What a channel's columns depend on.
 struct Shape {
   const MessageType* type = nullptr;
@@ -133,7 +101,7 @@ size_t AppendNames(const MessageType& type, std::span<const uint8_t> data,
 
 Json TimeUnits() { return {{"time", "s"}, {"tick", ""}}; }
 
-void WriteUnits(const Json& units, File* file) {
+void WriteUnits(const Json& units, CheckedFile* file) {
   file->Write(units.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
@@ -241,13 +209,13 @@ std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string
   if (error) throw LogError(fmt::format("{}: cannot be made: {}", folder, error.message()));
   struct Table {
     Table(const std::string& path, Shape s) : file(path), shape(std::move(s)) {}
-    File file;
+    CheckedFile file;
     Shape shape;
   };
   const int64_t lead = LeadTime(messages);
   std::map<std::string, Table, std::less<>> tables;
   Json units = Json::object();
-  File units_file((fs::path(folder) / kUnitsFile).string());
+  CheckedFile units_file((fs::path(folder) / kUnitsFile).string());
   Results results;
   LogEvent event;
   std::string row;
@@ -353,7 +321,7 @@ std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::
     }
   }
   const int64_t lead = LeadTime(messages);
-  File out(file);
+  CheckedFile out(file);
   std::string row = "time,tick";
   for (const Column& column : columns) row += column.names;
   out.Write(row + "\n");
@@ -374,7 +342,7 @@ std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::
     }
     out.Write(row + cells + "\n");
   });
-  File units_file(fs::path(file).replace_extension(kUnitsFile).string());
+  CheckedFile units_file(fs::path(file).replace_extension(kUnitsFile).string());
   WriteUnits(units, &units_file);
   out.Close();
   units_file.Close();

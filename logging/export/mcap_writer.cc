@@ -4,8 +4,6 @@
 #include <zstd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <type_traits>
 
 #include "fmt/format.h"
@@ -89,15 +87,13 @@ void McapWriter::Times::Add(uint64_t time, bool is_first) {
 }
 
 McapWriter::McapWriter(const std::string& path, const std::string& library)
-    : path_(path), file_(path), out_(file_.part(), std::ios::binary) {
-  if (!out_) throw LogError(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
+    : path_(path), file_(path) {
   Write(kMcapMagic);
   WriteRecord(kHeader, Fields().AddString("").AddString(library).bytes());
 }
 
 void McapWriter::Write(std::string_view bytes) {
-  out_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  if (!out_) throw LogError(fmt::format("{}: writing failed: {}", path_, std::strerror(errno)));
+  file_.Write(bytes);
   position_ += bytes.size();
   crc_ = Crc32(crc_, bytes);
 }
@@ -253,9 +249,7 @@ void McapWriter::Close() {
   Write(footer.bytes());
   Write(Fields().Add(crc_).bytes());
   Write(kMcapMagic);
-  out_.close();
-  if (!out_) throw LogError(fmt::format("{}: writing failed: {}", path_, std::strerror(errno)));
-  file_.Keep();
+  file_.Close();
 }
 
 }  // namespace poise::logging

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <fstream>
 #include <map>
 #include <span>
 #include <string>
@@ -55,8 +54,7 @@ class McapWriter {
   void CheckFree(uint16_t used, const char* what) const;
 
   std::string path_;
-  PartialFile file_;
-  std::ofstream out_;
+  CheckedFile file_;
   uint64_t position_ = 0;  // bytes written
   uint32_t crc_ = 0;       // of them, from the section's start
   std::string chunk_;

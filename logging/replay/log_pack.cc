@@ -3,12 +3,8 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
 #include <filesystem>
 #include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
@@ -33,8 +29,7 @@ constexpr int kPackFormat = 1;
 constexpr int64_t kBlockEvents = 4096;
 constexpr size_t kRecordHeader = 28;
 constexpr uint32_t kRecordMagic = 0xEDA1DA01u;
-constexpr size_t kWriteBuffer = 1 << 20;  // bytes
-constexpr int64_t kTicksPerCall = 500;    // of OnTick
+constexpr int64_t kTicksPerCall = 500;  // of OnTick
 
 /// An event that no component makes again.
 struct KeptEvent {
@@ -328,21 +323,11 @@ PackResult UnpackLog(const std::string& packed, const std::string& log,
     throw LogError(fmt::format("{}: exists; remove it or name another file", log));
   }
   const PackedRun run = ReadPacked(packed);
-  PartialFile file(log);
-  struct CloseFile {
-    void operator()(std::FILE* f) const { std::fclose(f); }
-  };
-  std::unique_ptr<std::FILE, CloseFile> out(std::fopen(file.part().c_str(), "wbe"));
-  const auto fail = [&] {
-    throw LogError(fmt::format("{}: cannot be written: {}", log, std::strerror(errno)));
-  };
-  if (!out) fail();
-  std::setvbuf(out.get(), nullptr, _IOFBF, kWriteBuffer);
+  CheckedFile file(log);
   RemadeLog(run, packed, [&](std::span<const uint8_t> record) {
-    if (std::fwrite(record.data(), 1, record.size(), out.get()) != record.size()) fail();
+    file.Write({reinterpret_cast<const char*>(record.data()), record.size()});
   }).Make(registry, on_tick);
-  if (std::fclose(out.release()) != 0) fail();
-  file.Keep();
+  file.Close();
   return {run.bytes, FileSize(packed), run.ticks};
 }
 

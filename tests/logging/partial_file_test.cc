@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -32,6 +33,27 @@ class PartialFileTest : public testing::Test {
   std::string path_ = folder_.path("file");
   std::string part_ = path_ + ".part";
 };
+
+TEST_F(PartialFileTest, ACheckedFileIsThereOnceItIsClosed) {
+  CheckedFile file(path_);
+  file.Write("some ");
+  *file.stream() << "text";
+  EXPECT_FALSE(fs::exists(path_));
+  file.Close();
+  EXPECT_EQ(ReadBytes(path_), "some text");
+}
+
+TEST_F(PartialFileTest, ACheckedFileSaysWhyItsFirstWriteFailed) {
+  CheckedFile file("/dev/full");
+  *file.stream() << std::string(1 << 20, 'x');
+  errno = EPERM;
+  try {
+    file.Close();
+    FAIL() << "has written";
+  } catch (const LogError& error) {
+    EXPECT_STREQ(error.what(), "/dev/full: cannot be written: No space left on device");
+  }
+}
 
 TEST_F(PartialFileTest, ReplacesTheFileOnlyWhenKept) {
   WriteBytes(path_, "before");

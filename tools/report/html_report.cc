@@ -3,9 +3,7 @@
 #include <google/protobuf/util/json_util.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <fstream>
 #include <functional>
 #include <map>
@@ -97,35 +95,6 @@ Json ScenarioJson(const Scenario& scenario) {
   }
   return Json::parse(text);
 }
-
-/// A file that remembers why the first of its writes failed.
-class PageFile final : public std::filebuf {
- public:
-  int problem() const { return problem_; }
-
- protected:
-  int_type overflow(int_type c) override {
-    const int_type result = std::filebuf::overflow(c);
-    if (result == traits_type::eof()) Note();
-    return result;
-  }
-  std::streamsize xsputn(const char* data, std::streamsize size) override {
-    const std::streamsize written = std::filebuf::xsputn(data, size);
-    if (written != size) Note();
-    return written;
-  }
-  int sync() override {
-    const int result = std::filebuf::sync();
-    if (result != 0) Note();
-    return result;
-  }
-
- private:
-  void Note() {
-    if (problem_ == 0) problem_ = errno;
-  }
-  int problem_ = 0;  // errno
-};
 
 /// Packs columns and writes each distinct one once, as an element of the page.
 class BlobWriter {
@@ -306,23 +275,17 @@ void WritePage(const char* name, std::ostream* out, const std::function<void()>&
 /// What `write` writes, or `file` as it was. Throws ConfigError; `flag` names the file.
 void WriteFile(const fs::path& file, const char* flag,
                const std::function<void(std::ostream* out)>& write) {
-  std::optional<logging::PartialFile> partial;
-  try {
-    partial.emplace(file.string());
-  } catch (const logging::LogError& error) {
-    throw ConfigError(fmt::format("{}; name another file with {}", error.what(), flag));
-  }
-  PageFile page;
-  page.open(partial->part(), std::ios::out | std::ios::binary);
-  std::ostream out(&page);
-  write(&out);
-  out.flush();
-  if (!out || page.close() == nullptr) {
-    const int problem = page.problem() != 0 ? page.problem() : errno;
-    throw ConfigError(fmt::format("{}: cannot be written: {}; name another file with {}",
-                                  file.string(), std::strerror(problem), flag));
-  }
-  partial->Keep();
+  const auto with_flag = [&](const auto& act) {
+    try {
+      act();
+    } catch (const logging::LogError& error) {
+      throw ConfigError(fmt::format("{}; name another file with {}", error.what(), flag));
+    }
+  };
+  std::optional<logging::CheckedFile> page;
+  with_flag([&] { page.emplace(file.string()); });
+  write(page->stream());
+  with_flag([&] { page->Close(); });
 }
 
 void WriteChartsData(const fs::path& file, const char* flag, const std::vector<Json>& sets) {
