@@ -303,11 +303,9 @@ void MujocoWorld::SetNormalReference(const Contact& contact, int row) {
 }
 
 void MujocoWorld::SolveContacts() {
-  iterations_ = 0;
   double pace = 1;
   for (solutions_ = 1;; ++solutions_) {
     mj_fwdConstraint(robot_.model.get(), data_.get());
-    iterations_ += data_->solver_iter;
     const SlipChange change = FindSlipChange();
     if (change.largest <= 1) return;
     if (solutions_ == kMostSolutions) break;

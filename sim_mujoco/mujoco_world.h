@@ -60,8 +60,7 @@ class MujocoWorld : public World {
   Eigen::Vector3d contact_force(int index) const override;
   Eigen::Vector3d contact_moment(int index) const override;
 
-  /// The last step took that many Newton iterations, and Coulomb's law that many solutions.
-  int solver_iterations() const { return iterations_; }
+  /// Coulomb's law took that many solutions in the last step.
   int solutions() const { return solutions_; }
   /// Steps since construction in which that many were not enough: the last one was taken.
   int unsolved_steps() const { return unsolved_steps_; }
@@ -104,7 +103,7 @@ class MujocoWorld : public World {
   size_t num_contacts_ = 0;  // of the step to come, or of the last one
   bool stepped_ = false;     // since contacts were added
   Eigen::Vector3d applied_force_ = Eigen::Vector3d::Zero();  // N, sum of AddForce
-  int iterations_ = 0, solutions_ = 0, unsolved_steps_ = 0;
+  int solutions_ = 0, unsolved_steps_ = 0;
   char message_[160] = "";
 };
 

@@ -114,10 +114,6 @@ std::vector<BenchmarkFigure> OfRuns(const BenchmarkResult& result) {
   return {figure};
 }
 
-std::string Cell(const std::optional<double>& value) {
-  return value ? fmt::format("{}", *value) : "";
-}
-
 template <class Format>
 std::string Known(const std::optional<double>& value, const Format& format) {
   return value ? format(*value) : std::string("–");
@@ -151,9 +147,10 @@ std::string BenchmarkCsv(const std::vector<BenchmarkResult>& results) {
       const SweepRow none;
       const SweepRow& run = f.untold != nullptr ? *f.untold : none;
       csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}\n", result.part.name(),
-                         CsvCell(f.point), Cell(f.value), CsvCell(f.unit), f.bound, Cell(f.impulse),
-                         Cell(f.per_mass), Cell(f.of_pendulum), Cell(f.of_duration), run.outcome,
-                         CsvCell(run.component), CsvCell(run.stage), CsvCell(run.reason));
+                         CsvCell(f.point), CsvNumber(f.value), CsvCell(f.unit), f.bound,
+                         CsvNumber(f.impulse), CsvNumber(f.per_mass), CsvNumber(f.of_pendulum),
+                         CsvNumber(f.of_duration), run.outcome, CsvCell(run.component),
+                         CsvCell(run.stage), CsvCell(run.reason));
     }
   }
   return csv;

@@ -2,6 +2,7 @@
 
 #include <sys/resource.h>
 #include <sys/statvfs.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -120,6 +121,16 @@ void WriteFile(const fs::path& path, const std::string& text) {
   if (out.flush()) return;
   throw ConfigError(fmt::format("{}: cannot be written: {}", path.string(),
                                 errno != 0 ? std::strerror(errno) : "unknown reason"));
+}
+
+bool WriteAll(int fd, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = write(fd, text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return false;
+    text.remove_prefix(static_cast<size_t>(written));
+  }
+  return true;
 }
 
 }  // namespace poise

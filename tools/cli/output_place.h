@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "components/framework/graph.pb.h"
 
@@ -39,5 +40,8 @@ std::string FormatBytes(int64_t bytes);
 
 /// Writes a whole file. Throws ConfigError that names the file and the reason.
 void WriteFile(const std::filesystem::path& path, const std::string& text);
+
+/// Writes all of `text`; false: it cannot be.
+bool WriteAll(int fd, std::string_view text);
 
 }  // namespace poise

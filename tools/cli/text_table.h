@@ -1,10 +1,12 @@
 // Tables in plain text.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "fmt/format.h"
 #include "tools/cli/output_style.h"
 
 namespace poise {
@@ -33,5 +35,10 @@ std::string FormatColumns(std::vector<TableRow> rows, int width = ScreenStyle().
 
 /// `text` as a cell of a CSV file (RFC 4180): in quotes where it must be.
 std::string CsvCell(const std::string& text);
+/// A number as such a cell; empty without one.
+template <class Number>
+std::string CsvNumber(const std::optional<Number>& value) {
+  return value ? fmt::format("{}", *value) : "";
+}
 
 }  // namespace poise

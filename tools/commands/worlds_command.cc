@@ -115,10 +115,6 @@ std::string FormatWorlds(const std::vector<WorldRun>& worlds) {
 constexpr char kCsvHead[] =
     "scenario,metric,label,unit,at_least,at_most,paper,engine,measured,passed\n";
 
-std::string CsvNumber(const std::optional<double>& value) {
-  return value ? fmt::format("{}", *value) : "";
-}
-
 std::string WorldsCsv(const std::string& scenario, const std::vector<WorldRun>& worlds) {
   std::string lines;
   for (const WorldRun& world : worlds) {

@@ -171,10 +171,6 @@ Json ScenarioPart(const std::vector<const MatrixCell*>& cells) {
       {"rows", rows}};
 }
 
-std::string Number(const std::optional<double>& value) {
-  return value ? fmt::format("{}", *value) : "";
-}
-
 /// Cells of a scenario stand together.
 std::vector<std::vector<const MatrixCell*>> ByScenario(const std::vector<MatrixCell>& cells) {
   std::vector<std::vector<const MatrixCell*>> groups;
@@ -246,11 +242,11 @@ std::string MatrixCsv(const std::vector<MatrixCell>& cells) {
     }
     for (const CheckResult& check : cell.checks) {
       csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", run, CsvCell(cell.outcome),
-                         Number(cell.fell_at), Number(cell.simulated_time), Truth(cell.passed),
-                         CsvCell(check.name), CsvCell(check.label), CsvCell(check.unit),
-                         Number(check.measured), Number(check.at_least), Number(check.at_most),
-                         check.limited() ? Truth(check.passed) : "", CsvCell(check.paper),
-                         Number(check.paper_value));
+                         CsvNumber(cell.fell_at), CsvNumber(cell.simulated_time),
+                         Truth(cell.passed), CsvCell(check.name), CsvCell(check.label),
+                         CsvCell(check.unit), CsvNumber(check.measured), CsvNumber(check.at_least),
+                         CsvNumber(check.at_most), check.limited() ? Truth(check.passed) : "",
+                         CsvCell(check.paper), CsvNumber(check.paper_value));
     }
   }
   return csv;

@@ -19,6 +19,7 @@
 #include "fmt/chrono.h"
 #include "fmt/format.h"
 #include "logging/printable.h"
+#include "tools/cli/output_place.h"
 #include "tools/run/live_run.h"
 #include "tools/run/run_dir.h"
 
@@ -57,16 +58,6 @@ fs::path SharedDir(uid_t user) { return fmt::format("/tmp/{}{}", kDirPrefix, use
 bool BelongsTo(const fs::path& dir, uid_t user) {
   struct stat status {};
   return lstat(dir.c_str(), &status) == 0 && S_ISDIR(status.st_mode) && status.st_uid == user;
-}
-
-bool WriteAll(int fd, std::string_view text) {
-  while (!text.empty()) {
-    const ssize_t written = write(fd, text.data(), text.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return false;
-    text.remove_prefix(static_cast<size_t>(written));
-  }
-  return true;
 }
 
 std::string ReadAll(int fd) {

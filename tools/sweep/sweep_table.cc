@@ -12,11 +12,6 @@
 namespace poise {
 namespace {
 
-template <class Number>
-std::string Cell(const std::optional<Number>& value) {
-  return value ? fmt::format("{}", *value) : "";
-}
-
 std::string Line(const std::vector<std::string>& cells) {
   std::string line;
   for (const std::string& cell : cells) {
@@ -57,11 +52,11 @@ std::string SweepCsv(const SweepHeader& header, const SweepRows& rows) {
   std::string csv = Line(names);
   for (const auto& [key, row] : rows) {
     std::vector<std::string> cells = Place(points, row.run);
-    if (limit) cells.push_back(Cell(row.limit));
+    if (limit) cells.push_back(CsvNumber(row.limit));
     // A run that does not tell when it ended leaves the cell empty.
     const bool ended = row.survived() || row.ended_at != 0;
     cells.insert(cells.end(),
-                 {row.outcome, Cell(row.fell_at), ended ? fmt::format("{}", row.ended_at) : "",
+                 {row.outcome, CsvNumber(row.fell_at), ended ? fmt::format("{}", row.ended_at) : "",
                   row.phase, row.trouble, row.reason, row.component, row.stage});
     for (const std::string& name : header.columns) {
       const auto metric = row.metrics.find(name);
@@ -127,17 +122,17 @@ std::string LimitCsv(const SweepHeader& header, const SweepRows& rows) {
   for (const LimitPoint& point : LimitPoints(header, rows)) {
     std::vector<std::string> cells = Place(points, point.run);
     cells.insert(cells.end(),
-                 {Cell(point.search.limit()), Cell(point.search.fails_at()),
-                  Cell(point.search.largest_survived()), Cell(point.search.monotone()),
-                  Cell(std::optional(point.search.tried())), fmt::format("{}", point.untold)});
+                 {CsvNumber(point.search.limit()), CsvNumber(point.search.fails_at()),
+                  CsvNumber(point.search.largest_survived()), CsvNumber(point.search.monotone()),
+                  CsvNumber(std::optional(point.search.tried())), fmt::format("{}", point.untold)});
     const std::optional<PushBound> push = point.any->push;
     const std::optional<PushBound> bound = push && push->bounded() ? push : std::nullopt;
     const auto impulse = [](const SweepRow* row) {
       return row != nullptr && row->push ? std::optional(row->push->impulse) : std::nullopt;
     };
     const std::optional<double> at_limit = impulse(point.at_limit);
-    cells.push_back(Cell(at_limit));
-    cells.push_back(Cell(impulse(point.at_largest)));
+    cells.push_back(CsvNumber(at_limit));
+    cells.push_back(CsvNumber(impulse(point.at_largest)));
     const auto of_bound = [&](double PushBound::*field) {
       cells.push_back(bound ? fmt::format("{}", (*bound).*field) : "");
     };

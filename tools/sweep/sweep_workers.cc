@@ -18,6 +18,7 @@
 #include "components/framework/clock.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
+#include "tools/cli/output_place.h"
 
 namespace poise {
 namespace {
@@ -25,17 +26,6 @@ namespace {
 constexpr int kThrew = 3;  // exit code of a task whose work threw
 // Outside the ticks one step may be long: a robot's file is read, a figure of a long run made.
 constexpr int64_t kStepPatience = 15 * kStallPatience;
-
-bool WriteAll(int fd, const std::string& text) {
-  size_t written = 0;
-  while (written < text.size()) {
-    const ssize_t count = write(fd, text.data() + written, text.size() - written);
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) return false;
-    written += static_cast<size_t>(count);
-  }
-  return true;
-}
 
 [[noreturn]] void Work(const std::function<std::string(TaskStatus*)>& work, TaskStatus* status,
                        int pipe, pid_t parent) {
