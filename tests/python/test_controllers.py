@@ -126,6 +126,39 @@ class Judged(unittest.TestCase):
         self.assertAlmostEqual(poise.run("walk", {"graph": "impedance", "duration": 6}, components={"holder": holder(True)})
                                .metric("walk_course_share"), 0, delta=2)
 
+    def test_who_walks_has_walked_whoever_commands_it(self):
+        walked = poise.run("walk")
+        played = walked["JOINT_COMMAND"]
+
+        def plays(self, tick, inputs, outputs):
+            for field in ("torque", "position", "velocity", "stiffness", "damping"):
+                outputs.joint_command[field][...] = getattr(played, field)[tick.index]
+
+        run, checks, shown = self.run_it("walk", "torque", holder(False, step=plays))
+        for channel in ("SUPPORT_PLAN", "TASK_TORQUE", "BALANCE_TORQUE"):
+            with self.assertRaises(KeyError):
+                run[channel]
+        self.assertTrue(run.passed, shown.stdout)
+        self.assertEqual(shown.returncode, 0, shown.stdout)
+        np.testing.assert_array_equal(run["GROUND_TRUTH"].joint_position, walked["GROUND_TRUTH"].joint_position)
+        told = re.search(r"It walked (\d+) steps, a way of ([\d.]+) m", " ".join(shown.stdout.split()))
+        self.assertGreater(int(told[1]), 50)
+        self.assertGreater(float(told[2]), 1)
+        for metric in ("fallen", "steps", "walk_course_share", "walk_turn_share", "walk_way", "walk_speed_max", "walk_cost_of_transport",
+                       "torque_step_max", "joint_torque_share"):
+            self.assertEqual(checks[metric]["missing"], [], metric)
+            self.assertEqual(checks[metric]["measured"], walked.metric(metric), metric)
+        for metric in ("violated_ticks", "eta_infeasible_ticks", "walk_velocity_error_rms"):
+            self.assertIsNone(checks[metric]["measured"], metric)
+        # The same course walked by half is no walk of it.
+        half = len(played.torque) // 2
+
+        def stops(self, tick, inputs, outputs):
+            super(type(self), self).step(tick, inputs, outputs) if tick.index > half else plays(self, tick, inputs, outputs)
+
+        run, checks, shown = self.run_it("walk", "torque", holder(False, step=stops))
+        self.assertFalse(run.passed)
+
     def test_a_fall_in_a_sweep_is_a_fall(self):
         out = os.path.join(tempfile.mkdtemp(dir=FOLDER), "sweep")
         done = subprocess.run([os.path.join(os.environ["POISE_BIN"], "poise"), "sweep", "push", "--set", "graph=torque",
