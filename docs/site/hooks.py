@@ -8,20 +8,30 @@ import shutil
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import headers
 import older
 
 KATEX = "/usr/share/javascript/katex"  # Debian's libjs-katex
 LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?!https?:|mailto:|#)([^)#\s]+)[^)]*\)")
 
 
+def repository_link(text, path, folder):
+    """A link to what only the repository has: to the C++ reference if it says what the header has, else the path as code."""
+    page, anchor, names = headers.reference()[1].get(path, (None, None, None))
+    if page:
+        anchor = next((names[word] for word in re.findall(r"\w+", text) if word in names), anchor)
+        return f"[{text}]({os.path.relpath(f'reference/cpp/{page}', folder)}#{anchor})"
+    return f"`{path}`" if path.endswith(text.strip("`/")) else f"{text} (`{path}`)"
+
+
 def on_page_markdown(markdown, page, config, files):
-    """A link to what only the repository has becomes its path, since the site is read without the repository."""
+    """A link to what only the repository has leads to what the site has of it, since the site is read without the repository."""
     page.title = page.title.replace("`", "")  # the navigation shows no code
     folder = os.path.dirname(page.file.src_uri)
 
     def replace(match):
         path = os.path.normpath(os.path.join(folder, match[2]))
-        return match[0] if files.get_file_from_path(path) else f"{match[1]} (`{path}`)"
+        return match[0] if files.get_file_from_path(path) else repository_link(match[1], path, folder)
 
     if folder == "docs/results":
         markdown = older.marked(markdown)

@@ -92,6 +92,23 @@ test('every page of docs/ stands in the navigation, in its section', {skip}, () 
   assert.deepEqual(wanted.filter((page) => !linked.has(html(page))), [], 'give them a place in docs/site/mkdocs.yml, under nav');
 });
 
+test('every type of a header has a heading, and pages lead to it', {skip}, () => {
+  const FOLDERS = ['components', 'sim', 'sim_ode', 'sim_mujoco', 'hw_bridge', 'logging', 'tools'];
+  const lacking = [];
+  for (const header of FOLDERS.flatMap(repositoryFiles).filter((f) => f.endsWith('.h'))) {
+    const text = pages.get(`reference/cpp/${dirname(header).replace(/^components\//, '').replaceAll('/', '_')}.html`);
+    const types = [...readFileSync(join(root, header), 'utf8').matchAll(/^(?:class|struct|enum class|enum) (\w+)[^;]*\{/gm)].map((m) => m[1]);
+    const shown = new Set([...(text ?? '').matchAll(/<h3 id="[^"]+">(\w+)</g)].map((m) => m[1]));
+    lacking.push(...types.filter((type) => !shown.has(type)).map((type) => `${header}: ${type}`));
+  }
+  assert.deepEqual(lacking, []);
+  const targets = (page) => linksOf(page).map(({path, anchor}) => `${path}#${anchor}`);
+  assert.ok(targets('docs/concepts/steps.html').includes('reference/cpp/step_planner_stepping.html#pendulumh'), 'a header');
+  assert.ok(targets('docs/reference/equations/tasks.html').includes('reference/cpp/balance_tasks.html#pdacceleration'), 'a function');
+  assert.match(pages.get('docs/concepts/tick.html'), /<code>deploy\/graphs\/balance\.pbtxt<\/code><\/td>/, 'what the site has not');
+  assert.match(pages.get('docs/concepts/steps.html'), /<code>Step\.\w+<\/code> \(<code>tests\/graph\/step_test\.cc<\/code>\)/, 'a test');
+});
+
 // What a list holds is code by another indentation here than elsewhere: four columns, and a fence.
 test('what is code in Markdown is code in the site', {skip}, () => {
   const problems = [];
