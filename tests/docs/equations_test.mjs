@@ -7,7 +7,7 @@ import {readFileSync} from 'node:fs';
 import {dirname, join, normalize} from 'node:path';
 import {test} from 'node:test';
 import {parseArgs} from 'node:util';
-import {isFile, repositoryFiles, root, tablesOf} from './markdown.mjs';
+import {declaredTests, isFile, linksOf, repositoryFiles, root, tablesOf} from './markdown.mjs';
 
 const {values: options} = parseArgs({options: {identities: {type: 'string'}}});
 const EQUATIONS = Array.from({length: 79}, (_, i) => i + 1);
@@ -37,9 +37,8 @@ test('every equation of the paper stands once on these pages, and on the page of
   }
 });
 
-test('the functions are in the files that they link to, and the tests in tests/', () => {
-  const tests = new Set(repositoryFiles('tests').filter((f) => f.endsWith('.cc')).flatMap((f) =>
-    [...text(f).matchAll(/\bTEST(?:_F|_P)?\(\s*(\w+),\s*(\w+)\s*\)/g)].map((m) => `${m[1]}.${m[2]}`)));
+test('the functions and the tests are in the files that they link to', () => {
+  const declared = declaredTests();
   for (const {page, equations, by, tests: cell} of rows) {
     const functions = [...by.matchAll(/\[`([\w:]+)`\]\(([^)]+)\)/g)];
     assert.ok(functions.length > 0, `${page}: ${equations} names no function`);
@@ -50,7 +49,8 @@ test('the functions are in the files that they link to, and the tests in tests/'
     }
     const named = [...cell.matchAll(/`([^`]+)`/g)].map((m) => m[1]);
     assert.ok(named.length > 0, `${page}: ${equations} names no test`);
-    for (const name of named) assert.ok(tests.has(name), `${page}: there is no test ${name}`);
+    for (const name of named) assert.ok(declared.has(name), `${page}: there is no test ${name}`);
+    assert.deepEqual(linksOf(cell, page), named.map((name) => ({text: `\`${name}\``, file: declared.get(name)})), `${page}: ${equations}`);
   }
 });
 

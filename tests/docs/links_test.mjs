@@ -5,7 +5,7 @@ import {readFileSync} from 'node:fs';
 import {dirname, join, normalize} from 'node:path';
 import {test} from 'node:test';
 import {parseArgs} from 'node:util';
-import {anchorsOf, exists, isFile, linesOf, programFacts, repositoryFiles, root} from './markdown.mjs';
+import {anchorsOf, declaredTests, exists, isFile, linesOf, programFacts, repositoryFiles, root} from './markdown.mjs';
 import {longLines} from './wrap.mjs';
 
 const {values: options} = parseArgs({options: {poise: {type: 'string'}}});
@@ -20,8 +20,7 @@ const text = (f) => readFileSync(join(root, f), 'utf8');
 const buildFiles = files.filter((f) => /CMakeLists\.txt$/.test(f)).map(text).join('\n');
 /** A program is the first argument of what declares it. */
 const isBuilt = (program) => new RegExp(`\\w\\(${program}\\b`).test(buildFiles);
-const tests = new Set(sources.filter((f) => f.startsWith('tests/')).flatMap((f) =>
-    [...text(f).matchAll(/\bTEST(?:_F|_P)?\(\s*(\w+),\s*(\w+)\s*\)/g)].map((m) => `${m[1]}.${m[2]}`)));
+const tests = declaredTests();
 const scripts = files.filter((f) => /^(deploy\/(\w+|cluster\/\w+)|examples\/.*\.py)$/.test(f) || f.endsWith('.sh')).map(text).join('\n');
 
 /** What a run's folder holds: `logging/` and `tools/` write it. */

@@ -1,7 +1,7 @@
 // What the documentation's tests read of the repository and of its Markdown files.
 import {execFileSync, spawnSync} from 'node:child_process';
 import {existsSync, readdirSync, readFileSync, statSync} from 'node:fs';
-import {join} from 'node:path';
+import {dirname, join, normalize} from 'node:path';
 import {fileURLToPath} from 'node:url';
 
 export const root = fileURLToPath(new URL('../..', import.meta.url));
@@ -137,6 +137,14 @@ export function anchorsOf(file) {
 
 export const isFile = (path) => existsSync(join(root, path)) && statSync(join(root, path)).isFile();
 export const exists = (path) => existsSync(join(root, path));
+
+/** Tests of tests/, "Suite.Name", each with the file that declares it. */
+export const declaredTests = () => new Map(repositoryFiles('tests').filter((f) => f.endsWith('.cc')).flatMap((f) =>
+    [...readFileSync(join(root, f), 'utf8').matchAll(/\bTEST(?:_F|_P)?\(\s*(\w+),\s*(\w+)\s*\)/g)].map((m) => [`${m[1]}.${m[2]}`, f])));
+
+/** Links of a text of a page to files of the repository: {text, file}. */
+export const linksOf = (text, page) => [...text.matchAll(/(?<!!)\[([^\]]+)\]\((?!https?:|mailto:|#)([^)#\s]+)[^)]*\)/g)]
+    .map(([, shown, target]) => ({text: shown, file: normalize(join(dirname(page), target)).replace(/\/$/, '')}));
 
 /** Why this build's figures are others than those of the pages; undefined: they are the same bits. */
 export function otherBits(poise) {

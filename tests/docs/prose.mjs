@@ -48,6 +48,9 @@ export function sentencesOf(lines) {
   return sentences;
 }
 
+/** A line as it is read: a link's target is no part of it. */
+const asRead = (text) => text.replace(/\]\([^)]*\)/g, ']');
+
 /** What of a page is longer than it may be: lines (a table's rows aside), sentences, their average, the page. */
 export function tooLong(page, lines, most) {
   const problems = [];
@@ -60,7 +63,7 @@ export function tooLong(page, lines, most) {
     if (words > most.words) problems.push(`${page}:${number}: ${words} words, at most ${most.words}: ${text}`);
   }
   for (const {number, text} of lines) {
-    const length = [...text].length;
+    const length = [...asRead(text)].length;
     if (length > most.line && !/^(\||!\[)/.test(text)) problems.push(`${page}:${number}: ${length} characters, at most ${most.line}`);
   }
   return problems;

@@ -6,7 +6,7 @@ import {spawnSync} from 'node:child_process';
 import {readFileSync, statSync} from 'node:fs';
 import {join} from 'node:path';
 import {test} from 'node:test';
-import {linesOf, repositoryFiles, root} from './markdown.mjs';
+import {declaredTests, exists, linesOf, linksOf, repositoryFiles, root} from './markdown.mjs';
 import {measureOf, sentencesOf, tooLong} from './prose.mjs';
 
 const MOST = {average: 18, words: 40, line: 120, lines: 120};
@@ -43,6 +43,24 @@ test('every page but the index shows a picture, one that moves, and Python, and 
     assert.match(text, /^```python$/m, `${page} has no Python`);
   }
   assert.deepEqual(folder.filter((f) => f.endsWith('.svg')).sort(), [...shown].sort());
+});
+
+test('code and tests of every page but the index are one click away', () => {
+  const declared = declaredTests();
+  for (const page of pages.filter((f) => !f.endsWith('/README.md'))) {
+    const prose = linesOf(page).filter((l) => l.code === null).map((l) => l.text).join('\n');
+    const links = linksOf(prose, page);
+    const problems = links.filter(({file}) => !exists(file)).map(({file}) => `there is no ${file}`);
+    if (!links.some(({file}) => /^(components|sim\w*)\/.*\.(h|cc)$|^lcmtypes$/.test(file))) problems.push('has no link to code');
+    if (!links.some(({text}) => declared.has(text.slice(1, -1)))) problems.push('has no link to a test');
+    for (const {text, file} of links) {
+      if (/\w\.[A-Z]/.test(text) && declared.get(text.slice(1, -1)) !== file) problems.push(`${text} is not in ${file}`);
+    }
+    for (const [, span] of prose.replace(/\[[^\]]*\]\([^)]*\)/g, '').matchAll(/`([^`\s]+)`/g)) {
+      if (declared.has(span) || /^[\w./]+\/[\w./]*$/.test(span) && exists(span)) problems.push(`\`${span}\` is no link`);
+    }
+    assert.deepEqual(problems.map((p) => `${page}: ${p}`), []);
+  }
 });
 
 test('the pictures are small, and what draw.py draws', () => {
