@@ -1,4 +1,4 @@
-// Every page but the changelog and the lab's frozen entries is in short sentences, and as short as its folder asks for; the
+// Every page but the lab's frozen entries is in short sentences, and as short as its folder asks for; the
 // pictures of the concepts are small and what draw.py draws.
 // Usage: node style_test.mjs
 import assert from 'node:assert/strict';
@@ -17,10 +17,10 @@ const pages = folder.filter((f) => f.endsWith('.md'));
 const moves = (picture) => readFileSync(join(root, picture), 'utf8').includes('<animate ');
 
 /** Lines that a page may have, by folder: the longest name that fits counts. */
-const LINES = {'': 125, 'docs/concepts': MOST.lines, 'docs/how-to': 50, 'docs/reference': 280, 'docs/reference/equations': 150,
+const LINES = {'': 125, 'CHANGELOG.md': 150, 'docs/concepts': MOST.lines, 'docs/how-to': 50, 'docs/reference': 280, 'docs/reference/equations': 150,
   'docs/results': 100, 'docs/start': 250, 'docs/lab': 150};
 const linesFor = (page) => LINES[Object.keys(LINES).filter((name) => page.startsWith(name)).sort().at(-1)];
-const short = repositoryFiles().filter((f) => f.endsWith('.md') && !/^CHANGELOG|^docs\/lab\/./.test(f) || f === 'docs/lab/README.md');
+const short = repositoryFiles().filter((f) => f.endsWith('.md') && !/^docs\/lab\/./.test(f) || f === 'docs/lab/README.md');
 
 for (const page of short) {
   test(`${page} is short`, (t) => {
@@ -30,6 +30,17 @@ for (const page of short) {
     assert.deepEqual(problems, [], problems.join('\n'));
   });
 }
+
+test('the changelog has a release a heading, and a line or two a change', () => {
+  const lines = linesOf('CHANGELOG.md').map((l) => l.text);
+  const releases = lines.filter((line) => line.startsWith('## '));
+  assert.equal(releases[0], '## Unreleased');
+  assert.deepEqual(releases.slice(1).filter((line) => !/^## \[?\d+\.\d+\.\d+\]?, \d{4}-\d\d-\d\d$/.test(line)), [], 'VERSION, DATE');
+  assert.deepEqual(lines.filter((line) => /^### (?!(Added|Changed|Removed|Fixed)$)/.test(line)), []);
+  assert.deepEqual(lines.filter((line, i) => /^ {2}/.test(line) && /^ {2}/.test(lines[i + 1] ?? '')), [], 'three lines');
+  const changes = lines.filter((line) => line.startsWith('- '));
+  assert.equal(new Set(changes).size, changes.length, 'a change stands there twice');
+});
 
 test('every page but the index shows a picture, one that moves, and Python, and every picture is shown', () => {
   const shown = new Set();
