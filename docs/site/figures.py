@@ -22,14 +22,22 @@ def reads(page, heading):
     return keep
 
 
-def reads_row(page, heading): """As `reads`, for a function that also takes a row's number, its first cell and all its
-cells: it is called for each row.""" def keep(function): READERS[page, heading] = lambda task:
-task.each(functools.partial(function, task)) return function return keep
+def reads_row(page, heading):
+    """As `reads`, for a function that also takes a row's number, its first cell and all its cells: it is called for each row."""
+    def keep(function):
+        READERS[page, heading] = lambda task: task.each(functools.partial(function, task))
+        return function
+    return keep
 
 
-def each_column(task, columns, make): """make(place, what) of the columns after the first, `what` from `columns`; what
-cannot be made is told of its column.""" for place, what in enumerate(columns, 1): try: make(place, what) except NotMade
-as problem: for i in task.rows(): task.lack(i, str(problem), place)
+def each_column(task, columns, make):
+    """make(place, what) of the columns after the first, `what` from `columns`; what cannot be made is told of its column."""
+    for place, what in enumerate(columns, 1):
+        try:
+            make(place, what)
+        except NotMade as problem:
+            for i in task.rows():
+                task.lack(i, str(problem), place)
 
 
 def put_each(task, i, first, runs, *metrics):
@@ -38,8 +46,9 @@ def put_each(task, i, first, runs, *metrics):
         task.put(i, place, *(run[metric] for run in runs))
 
 
-def of(kept, claim): page = os.path.basename(claim.page)[:-3] return next((value for (p, heading), value in kept.items()
-if p == page and claim.heading.startswith(heading)), None)
+def of(kept, claim):
+    page = os.path.basename(claim.page)[:-3]
+    return next((value for (p, heading), value in kept.items() if p == page and claim.heading.startswith(heading)), None)
 
 
 def reader(claim):
@@ -225,25 +234,38 @@ def _(task, i, _, cells):
         task.put(i, place, limit["sim.push[0].peak"])
 
 
-@reads_row("estimation", "A load is found") def _(task, i, first, cells): if first.startswith("Talos"): raise
-NotMade("its command is not on the page: poise sweep push has no load by itself") when = re.search(r"(\d) s", first) end
-= "end" if not when or when[1] == "6" else "2s" runs = [task.command(task.told(), f"--inline --no-reference
-{flags(cells)} --seed {seed}".replace(" ", " ")).summary()[0] for seed in (1, 2, 3)] mass, x, y, z =
-(max((run[f"{metric}_{end}"] for run in runs), key=abs) for metric in ("mass_error", "com_estimate_error_x",
-"com_estimate_error_y", "com_estimate_error_z")) task.put(i, "mass", mass) task.put(i, "COM x, y", x, y) task.put(i,
-"COM z", z) x, y = ([abs(run[f"imu_tilt_{axis}_{end}"]) for run in runs] for axis in "xy") task.put(i, "IMU", min(x),
-max(x), -min(y), -max(y))
+@reads_row("estimation", "A load is found")
+def _(task, i, first, cells):
+    if first.startswith("Talos"):
+        raise NotMade("its command is not on the page: poise sweep push has no load by itself")
+    when = re.search(r"(\d) s", first)
+    end = "end" if not when or when[1] == "6" else "2s"
+    runs = [task.command(task.told(), f"--inline --no-reference {flags(cells)} --seed {seed}".replace("  ", " ")).summary()[0]
+            for seed in (1, 2, 3)]
+    mass, x, y, z = (max((run[f"{metric}_{end}"] for run in runs), key=abs) for metric in
+                     ("mass_error", "com_estimate_error_x", "com_estimate_error_y", "com_estimate_error_z"))
+    task.put(i, "mass", mass)
+    task.put(i, "COM x, y", x, y)
+    task.put(i, "COM z", z)
+    x, y = ([abs(run[f"imu_tilt_{axis}_{end}"]) for run in runs] for axis in "xy")
+    task.put(i, "IMU", min(x), max(x), -min(y), -max(y))
 
 
-@reads_row("foot_wrenches", "A foot sensor that fails") def _(task, i, first, _): kind, force =
-first.split()[0].upper(), re.search(r"[−+]\d+", first) bias = f" --set
-sim.foot_sensor_fault[0].force_z={force[0].replace('−', '-')}" if force else "" for place, told, start in ((1,
-task.told(), 0.2), (2, task.told("poise run unknown"), 10)): made = task.command(told, f"--inline --no-reference --set
-sim.foot_sensor_fault[0].foot=left --set " f"sim.foot_sensor_fault[0].kind={kind} --set
-sim.foot_sensor_fault[0].start={start}{bias}") noticed = [e["time"] for e in made.summary()[1]["events"] if e["name"] ==
-"foot_sensor_fault"] if not noticed: task.lack(i, "the fault was not noticed", place) continue late = noticed[0] - start
-if " ms" in task.claim.rows[i][place]: late *= 1000 task.put(i, place, *[late, GIVEN][:1 +
-task.claim.rows[i][place].count("20 ms")])
+@reads_row("foot_wrenches", "A foot sensor that fails")
+def _(task, i, first, _):
+    kind, force = first.split()[0].upper(), re.search(r"[−+]\d+", first)
+    bias = f" --set sim.foot_sensor_fault[0].force_z={force[0].replace('−', '-')}" if force else ""
+    for place, told, start in ((1, task.told(), 0.2), (2, task.told("poise run unknown"), 10)):
+        made = task.command(told, f"--inline --no-reference --set sim.foot_sensor_fault[0].foot=left --set "
+                                  f"sim.foot_sensor_fault[0].kind={kind} --set sim.foot_sensor_fault[0].start={start}{bias}")
+        noticed = [e["time"] for e in made.summary()[1]["events"] if e["name"] == "foot_sensor_fault"]
+        if not noticed:
+            task.lack(i, "the fault was not noticed", place)
+            continue
+        late = noticed[0] - start
+        if " ms" in task.claim.rows[i][place]:
+            late *= 1000
+        task.put(i, place, *[late, GIVEN][:1 + task.claim.rows[i][place].count("20 ms")])
 
 
 @reads("foot_wrenches", "Of 300 touch-downs")
@@ -317,15 +339,25 @@ def _(task, i, first, _):
     task.put(i, "median", statistics.median(warnings))
 
 
-@reads_row("pushes", "The whole benchmark") @reads_row("pushes", "The quick benchmark") @reads_row("pushes", "In ODE
-both robots") def _(task, i, first, _): made = task.command(task.told("poise benchmark"), NAME=robot(first)) rows =
-made.table("benchmark.csv") part = {name: [r for r in rows if r["part"] == name] for name in ("push_double",
-"push_single", "blocks", "lost", "late")} place = 1 for name in ("push_double", "push_single"): points = [r for r in
-part[name] if r["point"] not in ("mean", "least")] for key, times in (("impulse_per_mass", 1),
-("share_of_lip_of_duration", 100)): values = [r[key] * times for r in points] task.put(i, place,
-statistics.mean(values), min(values)) place += 1 stood = made.table("parts/blocks/table.csv") task.put(i, place,
-len(stands(stood)), len(stood)) for name in ("lost", "late"): place += 1 task.put(i, place, min(r["value"] for r in
-part[name] if r["point"] not in ("mean", "least")))
+@reads_row("pushes", "The whole benchmark")
+@reads_row("pushes", "The quick benchmark")
+@reads_row("pushes", "In ODE both robots")
+def _(task, i, first, _):
+    made = task.command(task.told("poise benchmark"), NAME=robot(first))
+    rows = made.table("benchmark.csv")
+    part = {name: [r for r in rows if r["part"] == name] for name in ("push_double", "push_single", "blocks", "lost", "late")}
+    place = 1
+    for name in ("push_double", "push_single"):
+        points = [r for r in part[name] if r["point"] not in ("mean", "least")]
+        for key, times in (("impulse_per_mass", 1), ("share_of_lip_of_duration", 100)):
+            values = [r[key] * times for r in points]
+            task.put(i, place, statistics.mean(values), min(values))
+            place += 1
+    stood = made.table("parts/blocks/table.csv")
+    task.put(i, place, len(stands(stood)), len(stood))
+    for name in ("lost", "late"):
+        place += 1
+        task.put(i, place, min(r["value"] for r in part[name] if r["point"] not in ("mean", "least")))
 
 
 @reads("gains", "On soft blocks")
@@ -359,37 +391,52 @@ def _(task, i, first, _):
         task.put(i, place, limits[direction]["sim.push[0].peak"])
 
 
-@reads("soft_ground", "Of 1,000 courses") def _(task): rows = task.command(task.told(), "--column violated_ticks
---column torque_step_max --column steps").table() stood = stands(rows) fell = [row for row in rows if row["outcome"] ==
-"fell"] times, feet = column(fell, "fell_at"), column(fell, "steps") broken = column(stood, "violated_ticks")
-task.put(0, 1, len(stood), 100 * len(stood) / len(rows), sum(v == 0 for v in broken), max(broken),
-statistics.median(column(stood, "torque_step_max")), max(column(stood, "torque_step_max")), len(fell), min(times),
-max(times), statistics.median(times), min(feet), max(feet), statistics.median(feet), sum(feet) / len(fell)) task.lack(1,
-"the first trouble is told in words that have changed")
+@reads("soft_ground", "Of 1,000 courses")
+def _(task):
+    rows = task.command(task.told(), "--column violated_ticks --column torque_step_max --column steps").table()
+    stood = stands(rows)
+    fell = [row for row in rows if row["outcome"] == "fell"]
+    times, feet = column(fell, "fell_at"), column(fell, "steps")
+    broken, steps = column(stood, "violated_ticks"), column(stood, "torque_step_max")
+    for i, values in enumerate((
+            (len(stood), len(rows), 100 * len(stood) / len(rows)), (sum(v == 0 for v in broken), max(broken)),
+            (statistics.median(steps), max(steps)), (len(fell), min(times), max(times), statistics.median(times)),
+            (min(feet), max(feet), statistics.median(feet), sum(feet) / len(fell)))):
+        task.put(i, 1, *values)
+    task.lack(5, "the first trouble is told in words that have changed")
 
 
-@reads("soft_ground", "With what gives way")
+@reads("soft_ground", "Balancing by the least change")
 def _(task):
     counts = [len(stands(task.command(task.told(), flags(cells)).table())) for cells in task.claim.rows]
     task.put(0, 1, counts[0])
     task.put(1, 1, counts[1], 48, 100 * sum(counts) / 64, 64)
 
 
-@reads("soft_ground", "Firm courses") def _(task): more = "--column violated_ticks --column torque_step_max" runs =
-[task.command(task.told(), f"{flags(task.claim.rows[0][:1])} {more}", K=f"{k}e3").table() for k in (10, 5, 3)] clean =
-[sum(row["violated_ticks"] == 0 for row in stands(rows)) for rows in runs] steps = [max(column(stands(rows),
-"torque_step_max")) for rows in runs] task.put(0, 1, *(len(stands(rows)) for rows in runs), 16, *clean, *steps) firm =
-task.command(task.told("poise sweep walk_courses --variant firm"), more).table() task.put(1, 1, len(stands(firm)),
-len(firm), sum(column(firm, "violated_ticks")), max(column(firm, "torque_step_max"))) task.lack(2, "which of the steps'
-figures are meant the row does not tell")
+@reads("soft_ground", "Firm courses")
+def _(task):
+    more = "--column violated_ticks --column torque_step_max"
+    runs = [task.command(task.told(), f"{flags(task.claim.rows[0][:1])} {more}", K=f"{k}e3").table() for k in (10, 5, 3)]
+    clean = [sum(row["violated_ticks"] == 0 for row in stands(rows)) for rows in runs]
+    steps = [max(column(stands(rows), "torque_step_max")) for rows in runs]
+    task.put(0, 1, *(len(stands(rows)) for rows in runs), 16, *clean, *steps)
+    firm = task.command(task.told("poise sweep walk_courses --variant firm"), more).table()
+    task.put(1, 1, len(stands(firm)), len(firm), sum(column(firm, "violated_ticks")), max(column(firm, "torque_step_max")))
+    task.lack(2, "which of the steps' figures are meant the row does not tell")
 
 
-@reads("soft_ground", "Pushed on firm courses") def _(task): for i, told in enumerate(task.claim.commands()): rows =
-task.command(told).table() key = next((k for k in rows[0] if "impulse" in k), None) if key is None: task.lack(i, "the
-table has no impulse") continue edge = 14.1 if i == 0 else 10 low, high = ([row for row in rows if (row[key] <= edge) ==
-below] for below in (True, False)) task.put(i, 1, *((len(stands(rows)), len(rows), len(stands(low)), edge,
-len(stands(high)), len(high)) if i == 0 else (len(stands(rows)), GIVEN, len(stands(low)), len(low), edge,
-len(stands(high)), len(high))))
+@reads("soft_ground", "Pushed on firm courses")
+def _(task):
+    for i, told in enumerate(task.claim.commands()):
+        rows = task.command(told).table()
+        key = next((k for k in rows[0] if "impulse" in k), None)
+        if key is None:
+            task.lack(i, "the table has no impulse")
+            continue
+        edge = 14.1 if i == 0 else 10
+        low, high = ([row for row in rows if (row[key] <= edge) == below] for below in (True, False))
+        task.put(i, 1, *((len(stands(rows)), len(rows), len(stands(low)), edge, len(stands(high)), len(high)) if i == 0 else
+                         (len(stands(rows)), GIVEN, len(stands(low)), len(low), edge, len(stands(high)), len(high))))
 
 
 @reads("soft_ground", "Stairs of 10 cm")
@@ -411,14 +458,14 @@ def _(task):
             task.put(i, place, shares[1 + i])
 
 
-@reads_row("speed", "The planner takes")
+@reads_row("real_time", "The planner takes")
 def _(task, i, _, cells):
-told = re.findall(r"`(poise [^`]*)`", cells[0])[0]
-times = [c["latency_us"] for world in WORLDS for c in task.command(told, f"--world {world}").summary()[1]["components"]
-if c["name"] == "step_planner"]
-task.put(i, "median", *sorted(t["median"] for t in times)[:1 + cells[1].count(" to ")])
-task.put(i, "99 %", *sorted(t["p99"] for t in times))
-task.lack(i, "how busy the machine is, is not a flag", 3)
+    told = re.findall(r"`(poise [^`]*)`", cells[0])[0]
+    times = [c["latency_us"] for world in WORLDS for c in task.command(told, f"--world {world}").summary()[1]["components"]
+             if c["name"] == "step_planner"]
+    task.put(i, "median", *sorted(t["median"] for t in times)[:1 + cells[1].count(" to ")])
+    task.put(i, "99 %", *sorted(t["p99"] for t in times))
+    task.lack(i, "how busy the machine is, is not a flag", 3)
 
 
 @reads_row("speed", "A thousand runs")
@@ -436,13 +483,14 @@ def _(task):
     step_limits(task, "--set step_planner.recovery.enabled=false --set step_planner.hip_strategy.enabled=true")
 
 
-STEP_ROWS = {"steps, N·s": "impulse", "steps: N·s": "impulse", "no step, N·s": "impulse", "no step: of m ω r":
-"share_of_lip", "of m ω r": "share_of_lip", "of m ω (r + l": "share_of_step", "largest survived":
-"largest_survived_impulse", "T, s": "step_time", "l, m": "reach"}
+STEP_ROWS = {"steps, N·s": "impulse", "steps: N·s": "impulse", "no step, N·s": "impulse", "no step: of m ω r": "share_of_lip",
+             "of m ω r": "share_of_lip", "of m ω (r + l": "share_of_step", "largest survived": "largest_survived_impulse",
+             "T, s": "step_time", "l, m": "reach"}
 
 
-def step_limits(task, no_step): """A row is a column of limits.csv, 16 directions across; a row that names no robot and
-engine goes on with those above.""" group, without_step = "", False
+def step_limits(task, no_step):
+    """A row is a column of limits.csv, 16 directions across; a row that names no robot and engine goes on with those above."""
+    group, without_step = "", False
 
     def row(i, first, _):
         nonlocal group, without_step
@@ -541,17 +589,21 @@ def _(task, i, _, cells):
     if i == 1:
         raise NotMade("needs root and two network interfaces: run its row by hand")
     figures, _ = task.command(task.told("deploy/run"), "--no-reference").summary()
-    task.put(i, 1, figures["drive_torque_step"], GIVEN, GIVEN, figures["bus_frames_sent"], GIVEN)
+    task.put(i, 1, figures["drive_torque_step"], figures["bus_frames_sent"], GIVEN)
 
 
-WITHOUT = { # tables of no reader, and why ("drives", "Of 100 faults"): "the test prints no counts of what ended how,
-and faults come at random moments", ("drives", "A million broken"): "passing is the figure; two of the three need
-build/sanitize: run the rows by hand", ("walking", "A push in a walk"): "FILE is an import of a maker's file that is no
-robot of deploy/robots", ("walking", "The tour"): "FILE is an import of a maker's file that is no robot of
-deploy/robots", ("engines", "The engine takes"): "perf record names no run, and symbols are sorted by hand", ("gains",
-"The rule gives"): "no run: the linear model of tests/balance/gains_test.cc with that day's robots' files", ("gains",
-"Stiffness and damping"): "its fields stand in the lab, and energy above 30 Hz is no metric", ("speed", "Replay and
-export"): "its rows need a run in real processes, RUN: run the rows by hand", ("speed", "A run's page"): "times of a
-machine and a browser: run the rows by hand", ("speed", "A hundred faults"): "real time on a machine that is kept busy
-on purpose: run the rows by hand", ("speed", "From sensors"): "real time of an idle and a busy machine: run the rows by
-hand", ("speed", "An hour in one process"): "times of a machine, with logs of 13 GB: run the rows by hand", }
+WITHOUT = {  # tables of no reader, and why
+    ("drives", "Of 100 faults"): "the test prints no counts of what ended how, and faults come at random moments",
+    ("drives", "A million broken"): "passing is the figure; two of the three need build/sanitize: run the rows by hand",
+    ("walking", "A push in a walk"): "FILE is an import of a maker's file that is no robot of deploy/robots",
+    ("walking", "The tour"): "FILE is an import of a maker's file that is no robot of deploy/robots",
+    ("engines", "The engine takes"): "perf record names no run, and symbols are sorted by hand",
+    ("gains", "The rule gives"): "no run: the linear model of tests/balance/gains_test.cc with that day's robots' files",
+    ("gains", "Stiffness and damping"): "its fields stand in the lab, and energy above 30 Hz is no metric",
+    ("speed", "Replay and export"): "its rows need a run in real processes, RUN: run the rows by hand",
+    ("speed", "A run's page"): "times of a machine and a browser: run the rows by hand",
+    ("real_time", "A hundred faults"): "real time on a machine that is kept busy on purpose: run the rows by hand",
+    ("real_time", "From sensors"): "real time of an idle and a busy machine: run its command by hand",
+    ("real_time", "A Python controller"): "times of a machine and of an installed package: run its command by hand",
+    ("speed", "An hour in one process"): "times of a machine, with logs of 13 GB: run the rows by hand",
+}

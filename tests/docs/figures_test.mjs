@@ -77,6 +77,11 @@ for (const page of pages) {
   });
 }
 
+test('what was measured stands in the results, in the lab and beside the paper\'s equations', () => {
+  const others = pages.filter((page) => !/^docs\/(results|lab|reference\/equations)\//.test(page));
+  assert.deepEqual(others.flatMap((page) => tablesOf(page).filter(isMeasured).map(({line}) => `${page}:${line}`)), []);
+});
+
 test('commits of "Measured:" lines are of this history', (t) => {
   if (spawnSync('git', ['-C', root, 'rev-parse', '--verify', 'HEAD~50'], {stdio: 'ignore'}).status !== 0) {
     t.skip('a copy without its history');
