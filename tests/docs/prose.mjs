@@ -51,7 +51,7 @@ export function sentencesOf(lines) {
 /** A line as it is read: a link's target is no part of it. */
 const asRead = (text) => text.replace(/\]\([^)]*\)/g, ']');
 
-/** What of a page is longer than it may be: lines (a table's rows aside), sentences, their average, the page. */
+/** What of a page is longer than it may be: lines (a table's are longer), sentences, their average, the page. */
 export function tooLong(page, lines, most) {
   const problems = [];
   const sentences = sentencesOf(lines);
@@ -64,7 +64,8 @@ export function tooLong(page, lines, most) {
   }
   for (const {number, text} of lines) {
     const length = [...asRead(text)].length;
-    if (length > most.line && !/^(\||!\[)/.test(text)) problems.push(`${page}:${number}: ${length} characters, at most ${most.line}`);
+    const line = text.startsWith('|') ? most.row : text.startsWith('![') ? Infinity : most.line;
+    if (length > line) problems.push(`${page}:${number}: ${length} characters, at most ${line}`);
   }
   return problems;
 }
