@@ -75,6 +75,13 @@ test('every page but the index shows a picture, one that moves, and Python, and 
   assert.deepEqual(folder.filter((f) => f.endsWith('.svg')).sort(), [...shown].sort());
 });
 
+test('words of the results and of the other concepts have a row in notation', () => {
+  const known = linesOf('docs/concepts/notation.md').filter((l) => l.text.startsWith('|')).map((l) => l.text.split('|')[1]).join();
+  const words = ['share of m ω r', 'share of m ω d', 'd_N', 'T, of a step', 'inner radius of a sole', 'cost of transport', 'course', 'lockstep', 'graph',
+    'stage', 'capture point', 'violated tick', 'resultant', 'known ground', 'NEES'];
+  assert.deepEqual(words.filter((word) => !known.includes(word)), []);
+});
+
 test('code and tests of every page but the index are one click away', () => {
   const declared = declaredTests();
   for (const page of pages.filter((f) => !f.endsWith('/README.md'))) {
