@@ -14,11 +14,6 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-robot::RobotData Evaluate(const robot::RobotModel& model, const robot::RobotState& state) {
-  const robot::RobotData data = robot::Evaluate(model, state);
-  return data;
-}
-
 VectorXd Velocity(const robot::RobotState& state) {
   VectorXd v(6 + state.joint_velocity.size());
   v << state.base_linear_velocity, state.base_angular_velocity, state.joint_velocity;
