@@ -12,7 +12,8 @@ import headers
 import older
 
 KATEX = "/usr/share/javascript/katex"  # Debian's libjs-katex
-LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?!https?:|mailto:|#)([^)#\s]+)[^)]*\)")
+# A block of code, which stays, or a link: its text and target.
+LINK = re.compile(r"^ *```[\s\S]*?^ *```$|(?<!!)\[([^\]]+)\]\((?!https?:|mailto:|#)([^)#\s]+)[^)]*\)", re.M)
 
 
 def repository_link(text, path, folder):
@@ -30,6 +31,8 @@ def on_page_markdown(markdown, page, config, files):
     folder = os.path.dirname(page.file.src_uri)
 
     def replace(match):
+        if not match[2]:
+            return match[0]
         path = os.path.normpath(os.path.join(folder, match[2]))
         return match[0] if files.get_file_from_path(path) else repository_link(match[1], path, folder)
 
