@@ -24,7 +24,7 @@ struct WalkCommand {
   /// s from touch-down to touch-down; above 0, `stride` says where each foot comes down from the
   /// other sole, in its axes, and `velocity` and `turn_rate` are what that comes to.
   double period = 0;
-  FootArray<Footstep> stride;
+  FootArray<Footstep> stride{};
 
   bool in_place() const { return velocity.isZero(0) && turn_rate == 0; }
   void Archive(StateArchive* archive) {
