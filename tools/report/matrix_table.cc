@@ -242,9 +242,9 @@ std::string MatrixCsv(const std::vector<MatrixCell>& cells) {
     }
     for (const CheckResult& check : cell.checks) {
       csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", run, CsvCell(cell.outcome),
-                         CsvNumber(cell.fell_at), CsvNumber(cell.simulated_time),
-                         Truth(cell.passed), CsvCell(check.name), CsvCell(check.label),
-                         CsvCell(check.unit), CsvNumber(check.measured), CsvNumber(check.at_least),
+                         CsvNumber(cell.fell_at), cell.simulated_time, Truth(cell.passed),
+                         CsvCell(check.name), CsvCell(check.label), CsvCell(check.unit),
+                         CsvNumber(check.measured), CsvNumber(check.at_least),
                          CsvNumber(check.at_most), check.limited() ? Truth(check.passed) : "",
                          CsvCell(check.paper), CsvNumber(check.paper_value));
     }
