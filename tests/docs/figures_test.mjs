@@ -1,7 +1,8 @@
 // Tables of measured figures say by which commit, when and how they were measured, in a line above them that begins with
 // "Measured:". In docs/results/ the line stands below and names folders: docs/site/older.py asks git whether they have
 // changed since. Tables whose line ends with "Compared by the tests." are measured again: every figure with a unit in the
-// columns "ours" and "measured" must be among what the line's commands print.
+// columns "ours" and "measured" must be among what the line's commands print; where there is no such column, deploy/results
+// makes the table anew and must find each figure the same.
 // Usage: node figures_test.mjs --poise PROGRAM
 import assert from 'node:assert/strict';
 import {execFileSync, spawnSync} from 'node:child_process';
@@ -131,8 +132,32 @@ test('a table is told to be older than the code once a folder of its line has ch
   }
 });
 
+const OURS = ['ours', 'measured'];
 const other = compared.length > 0 ? otherBits(options.poise) : undefined;
-for (const {page, line, rows, measured} of compared) {
+const [printing, made] = [true, false].map((has) => compared.filter(({rows}) => rows[0].some((cell) => OURS.includes(cell)) === has));
+
+/** Names of deploy/results by page and place of the table, which stand in the pages' order. */
+function claimsByTable() {
+  const {stdout} = spawnSync(join(root, 'deploy/results'), ['--list'], {encoding: 'utf8'});
+  const claims = [...stdout.matchAll(/^\S+/gm)].map(([name]) => name);
+  const tables = pages.filter((page) => RESULTS.has(page)).flatMap((page) => tablesOf(page).map(({line}) => `${page}:${line}`));
+  assert.equal(claims.length, tables.length);
+  return new Map(tables.map((table, i) => [table, claims[i]]));
+}
+
+for (const {page, line} of made) {
+  test(`${page}:${line} has the figures that deploy/results makes`, {skip: other}, (t) => {
+    const claim = claimsByTable().get(`${page}:${line}`);
+    assert.ok(claim, `${page}:${line}: no table of results`);
+    const {status, stdout, stderr} = spawnSync(join(root, 'deploy/results'), [claim], {encoding: 'utf8',
+      env: {...process.env, POISE: resolve(options.poise)}});
+    assert.equal(status, 0, stdout + stderr);
+    assert.doesNotMatch(stdout, /not made/);
+    t.diagnostic(stdout.trim().split('\n').at(-1));
+  });
+}
+
+for (const {page, line, rows, measured} of printing) {
   test(`${page}:${line} has the figures of its commands`, {skip: other}, (t) => {
     const folder = mkdtempSync(join(tmpdir(), 'poise-figures-'));
     try {
@@ -144,7 +169,7 @@ for (const {page, line, rows, measured} of compared) {
       const output = commands.map((command) =>
         spawnSync('bash', ['-c', command], {cwd: folder, env, encoding: 'utf8', maxBuffer: 1 << 28}).stdout).join('\n');
       const printed = figuresOf(output);
-      const columns = rows[0].flatMap((cell, i) => (['ours', 'measured'].includes(cell) ? [i] : []));
+      const columns = rows[0].flatMap((cell, i) => (OURS.includes(cell) ? [i] : []));
       assert.ok(columns.length > 0, `${page}:${line}: has no column "ours" or "measured"`);
       const figures = rows.slice(2).flatMap((row) => columns.flatMap((i) => figuresOf(row[i] ?? '')
           .map((figure) => ({...figure, cell: row[i]}))));
