@@ -156,6 +156,32 @@ TEST(WalkLimits, WhatTheLegsCannotDoIsRefused) {
   EXPECT_THROW(MakeStepChoice(recovery, model), ConfigError);
 }
 
+/// The paper's robot whose hips turn a leg back by at most `limit`, rad.
+robot::RobotModel WithHips(double limit) {
+  std::string urdf = robot::ReadWhole(robot::UrdfPath(TestRobot::kDyros));
+  const std::string bound = "lower=\"-1.9\" upper=\"0.7\"";
+  for (size_t at = urdf.find(bound); at != std::string::npos; at = urdf.find(bound)) {
+    urdf.replace(at, bound.size(), "lower=\"-1.9\" upper=\"" + std::to_string(limit) + "\"");
+  }
+  return robot::LoadRobotTexts(robot::ReadWhole(robot::RobotPath(TestRobot::kDyros)), urdf);
+}
+
+// A default that the legs cannot do is no one's mistake: what they can do is walked. The same
+// number is one where it is given.
+TEST(WalkLimits, ADefaultThatTheLegsCannotDoIsNoMistake) {
+  int told = 0;
+  for (double limit = 0.7; limit > -0.5; limit -= 0.05) {
+    const robot::RobotModel model = WithHips(limit);
+    WalkConfig config = Enabled();
+    if (RefusedField(config, model) != "accepted") break;
+    config.set_longest(config.longest());
+    const std::string field = RefusedField(config, model);
+    EXPECT_TRUE(field == "accepted" || field == "walk.longest") << field << " at " << limit;
+    told += field == "walk.longest" ? 1 : 0;
+  }
+  EXPECT_GT(told, 0);
+}
+
 /// The paper's robot with soles 60 mm wide and ankles that roll by up to `limit`, rad.
 robot::RobotModel WithAnkles(double limit) {
   const auto replace = [](std::string* text, const std::string& before, const std::string& after,
