@@ -1,6 +1,8 @@
 // A module whose component fails on purpose. POISE_TEST_FAULT says how and when:
 //   hang:TICK    its stage loops for ever
 //   crash:TICK   SIGSEGV
+//   throw:TICK   an exception
+//   exit:TICK    exit(0)
 //   slip:SPEED   SIGSEGV as soon as the base moves faster, m/s
 // With POISE_TEST_FAULT_ONCE only where that file is not there yet; the fault makes it.
 #include <unistd.h>
@@ -11,10 +13,12 @@
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
+#include <stdexcept>
 
 #include "components/framework/component_type.h"
 #include "components/framework/module_entry.h"
 #include "components/messages/robot_resource.h"
+#include "poise/external_push_t.hpp"
 #include "poise/message_traits.hpp"
 #include "poise/robot_state_t.hpp"
 
@@ -27,7 +31,8 @@ class Faulty : public poise::Component {
     const char* const fault = std::getenv("POISE_TEST_FAULT");
     if (fault != nullptr) std::sscanf(fault, "%7[a-z]:%lf", kind_, &at_);
     wiring->AddInput(&robot_state_, "robot_state", poise::JointAndFootCounts(*model));
-    wiring->AddStage("watch", {&robot_state_}, {},
+    wiring->AddOutput(&watched_, "watched", {});
+    wiring->AddStage("watch", {&robot_state_}, {&watched_},
                      [this](const poise::Tick& tick) { Watch(tick.index); });
   }
 
@@ -42,11 +47,14 @@ class Faulty : public poise::Component {
       if (access(once, F_OK) == 0) return;
       std::fclose(std::fopen(once, "w"));
     }
+    if (kind == "throw") throw std::runtime_error("no reason");
+    if (kind == "exit") std::exit(0);
     if (kind != "hang") std::raise(SIGSEGV);
     for (std::atomic<bool> go{true}; go.load();) continue;
   }
 
   poise::Input<poise::robot_state_t> robot_state_;
+  poise::Output<poise::external_push_t> watched_;  // all zero, for a replay to compare
   char kind_[8] = {};
   double at_ = -1;
 };
@@ -58,5 +66,6 @@ POISE_MODULE {
                        "fails on purpose",
                        [] { return std::make_unique<Faulty>(); },
                        {},
-                       {poise::Reads<poise::robot_state_t>("robot_state")}});
+                       {poise::Reads<poise::robot_state_t>("robot_state"),
+                        poise::Writes<poise::external_push_t>("watched")}});
 }

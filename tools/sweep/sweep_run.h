@@ -18,7 +18,7 @@ inline constexpr char kFell[] = "fell";
 inline constexpr char kMissed[] = "missed";    ///< stood, but did not do what the sweep asks for
 inline constexpr char kStopped[] = "stopped";  ///< ended early, but not by a fall
 inline constexpr char kInvalid[] = "invalid";  ///< its configuration cannot be run
-inline constexpr char kCrashed[] = "crashed";  ///< the program did, or was killed
+inline constexpr char kCrashed[] = "crashed";  ///< the program did or was killed, or a stage threw
 inline constexpr char kHung[] = "hung";        ///< no tick came any more
 
 /// A finished run: a row of the table without its variables.

@@ -40,7 +40,11 @@ constexpr int64_t kStepPatience = 15 * kStallPatience;
   } catch (const std::exception& error) {
     text = error.what();
     code = kThrew;
+  } catch (...) {
+    text = "an exception that is no std::exception";
+    code = kThrew;
   }
+  status->SetReturned();
   _exit(WriteAll(pipe, text) ? code : kThrew);
 }
 
@@ -129,13 +133,20 @@ ForkedTasks::Result ForkedTasks::Finish(Task* task) {
   }
   Result result;
   result.id = task->id;
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
-    result.answer = std::move(task->text);
-  } else if (WIFSIGNALED(status)) {
+  const bool returned = task->status->returned(), in_stage = task->status->InStage();
+  result.crashed = WIFSIGNALED(status) || !returned || in_stage;
+  if (result.crashed) result.place = task->status->Place();
+  if (WIFSIGNALED(status)) {
     const int signal = WTERMSIG(status);
-    result.crashed = true;
-    result.place = task->status->Place();
     result.problem = fmt::format("ended by signal {} ({})", signal, sigdescr_np(signal));
+  } else if (!returned) {
+    result.problem =
+        fmt::format("{} the program with exit code {}",
+                    in_stage ? "its stage ended" : "something ended", WEXITSTATUS(status));
+  } else if (in_stage) {
+    result.problem = "its stage threw: " + task->text;
+  } else if (WEXITSTATUS(status) == 0) {
+    result.answer = std::move(task->text);
   } else {
     result.problem = task->text.empty() ? "ended without an answer" : std::move(task->text);
   }

@@ -33,7 +33,12 @@ class TaskStatus {
   /// Tells that the task goes on, where no ticks do.
   void Step() { steps_.fetch_add(1); }
   RunPosition* position() { return &position_; }
+  /// Tells that the work has given its answer or thrown: a process that ends before was ended by
+  /// what it ran.
+  void SetReturned() { returned_.store(true); }
+  bool returned() const { return returned_.load(); }
 
+  bool InStage() const { return position_.stage.load() != RunPosition::kNoStage; }
   RunPlace Place() const;
   /// ns, for how long it has stood still, if that is longer than it may; else 0. `now`: ns.
   int64_t Hangs(StallWatch* watch, int64_t now) const;
@@ -42,7 +47,7 @@ class TaskStatus {
   static constexpr size_t kRoom = 16384;  // bytes
 
   RunPosition position_;
-  std::atomic<bool> elsewhere_{false};
+  std::atomic<bool> elsewhere_{false}, returned_{false};
   std::atomic<int64_t> steps_{0};
   std::atomic<double> period_{0};
   std::atomic<int64_t> lead_{0};
@@ -58,7 +63,7 @@ class ForkedTasks {
     int64_t id = 0;
     std::optional<std::string> answer;
     std::string problem;   ///< without an answer: how the process ended, and its last words
-    bool crashed = false;  ///< a signal ended it
+    bool crashed = false;  ///< a signal, exit() in its work or an exception of a stage ended it
     bool hung = false;     ///< it stood still and was ended
     RunPlace place;        ///< where it was, of one that crashed or hung
   };
@@ -70,8 +75,8 @@ class ForkedTasks {
 
   int running() const { return static_cast<int>(tasks_.size()); }
   bool full() const { return running() >= at_once_; }
-  /// `work` gives the answer; what it throws is its problem. Precondition: not full(). Throws
-  /// std::system_error.
+  /// `work` gives the answer; what it throws is its problem, and outside the stages no crash.
+  /// Precondition: not full(). Throws std::system_error.
   void Start(int64_t id, const std::function<std::string(TaskStatus*)>& work);
   /// Waits at most `milliseconds` for the first one that ends. Returns those that have ended, and
   /// those that hang, which it ends.

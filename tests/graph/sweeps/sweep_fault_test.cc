@@ -23,8 +23,9 @@ class SweepFaultTest : public testing::Test {
     std::ofstream(Out("faulty.pbtxt"))
         << "# proto-file: components/framework/graph.proto\n# proto-message: poise.Graph\n"
            "base: \"balance\" name: \"faulty\"\n"
+           "channel { name: \"WATCHED\" type: \"external_push_t\" }\n"
            "component { name: \"faulty\" input { port: \"robot_state\" channel: \"ROBOT_STATE\" } "
-           "}\n";
+           "output { port: \"watched\" channel: \"WATCHED\" } }\n";
     deploy_.Scenario("faulty", "base: \"base/stand\" name: \"faulty\" duration: 0.3 graph: \"" +
                                    Out("faulty.pbtxt") + "\"\ncheck { metric: \"push_peak\" }\n");
   }
@@ -61,6 +62,42 @@ TEST_F(SweepFaultTest, ACrashIsNamedInEveryResult) {
   EXPECT_THAT(charts, HasSubstr("2 runs do not tell whether the robot stood"));
   EXPECT_THAT(charts, HasSubstr("crashed in faulty, stage watch, at 0.200 s"));
   EXPECT_THAT(charts, Not(HasSubstr("\"outcome\":\"fell\"")));
+}
+
+// Neither is a signal: an exception that a stage lets out, and exit(), of whatever code.
+TEST_F(SweepFaultTest, AnExceptionAndAnExitAreCrashesOfTheirStage) {
+  for (const auto& [fault, reason] :
+       {std::pair{"throw:100", "its stage threw: no reason"},
+        std::pair{"exit:100", "its stage ended the program with exit code 0"}}) {
+    SCOPED_TRACE(fault);
+    setenv("POISE_TEST_FAULT", fault, 1);
+    const std::string out = Out(std::string("out_") + fault);
+    const ProgramResult result =
+        RunPoise({"sweep", "faulty", "--vary", "duration=0.1,0.3", "--jobs", "1", "--out", out});
+    EXPECT_EQ(result.exit_code, 1) << result.output;
+    EXPECT_THAT(result.output,
+                HasSubstr(std::string("crashed in faulty, stage watch, at 0.200 s: ") + reason +
+                          "; it is made once more"));
+    const std::vector<CsvRow> rows = ReadCsv(out + "/table.csv");
+    ASSERT_EQ(rows.size(), 2u);
+    EXPECT_EQ(rows[0].at("outcome"), "stands");
+    EXPECT_EQ(rows[1].at("outcome"), "crashed");
+    EXPECT_EQ(rows[1].at("component"), "faulty");
+    EXPECT_EQ(rows[1].at("stage"), "watch");
+    EXPECT_EQ(std::stod(rows[1].at("ended_at")), 0.2);
+    EXPECT_EQ(rows[1].at("reason"), reason);
+    for (const char* file : {"results.jsonl", "charts.json", "charts.html"}) {
+      EXPECT_THAT(Read(out, file), HasSubstr(reason)) << file;
+    }
+
+    const std::string limit = Out(std::string("limit_") + fault);
+    const ProgramResult sought =
+        RunPoise({"limit", "faulty", "--field", "sim.push[0].peak", "--min", "10", "--max", "20",
+                  "--samples", "2", "--out", limit});
+    EXPECT_EQ(sought.exit_code, 1) << sought.output;
+    EXPECT_THAT(sought.output, HasSubstr(reason));
+    EXPECT_EQ(ReadCsv(limit + "/limits.csv").at(0).at("sim.push[0].peak"), "");
+  }
 }
 
 TEST_F(SweepFaultTest, WhatCrashesOnceOnlyIsMadeOnceMore) {

@@ -79,6 +79,38 @@ TEST(ForkedTasks, ACrashTellsWhereItWas) {
   EXPECT_EQ(place.time, 0.2);
 }
 
+// What a stage throws is its own fault; outside the stages it is the machine's: no memory, no disk.
+TEST(ForkedTasks, AnExceptionOfAStageAndAnExitAreCrashes) {
+  const auto in_stage = [](TaskStatus* status) {
+    status->SetRun({{"controller", "control"}}, 0.002, 0);
+    status->position()->stage.store(0);
+  };
+  ForkedTasks tasks(4);
+  tasks.Start(0, [&](TaskStatus* status) -> std::string {
+    in_stage(status);
+    throw std::runtime_error("no gain");
+  });
+  tasks.Start(1, [&](TaskStatus* status) -> std::string {
+    in_stage(status);
+    throw 3;
+  });
+  tasks.Start(2, [&](TaskStatus* status) -> std::string {
+    in_stage(status);
+    std::exit(0);
+  });
+  tasks.Start(3, [](TaskStatus*) -> std::string { std::exit(5); });
+  auto results = WaitForAll(&tasks);
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_TRUE(results[i].crashed) << i;
+    EXPECT_FALSE(results[i].answer) << i;
+    EXPECT_EQ(results[i].place.stage, i < 3 ? "control" : "") << i;
+  }
+  EXPECT_EQ(results[0].problem, "its stage threw: no gain");
+  EXPECT_EQ(results[1].problem, "its stage threw: an exception that is no std::exception");
+  EXPECT_EQ(results[2].problem, "its stage ended the program with exit code 0");
+  EXPECT_EQ(results[3].problem, "something ended the program with exit code 5");
+}
+
 constexpr int64_t kOneSecond = 1'000'000'000;  // ns
 
 /// Looks at `status` every 0.1 s for `seconds`, and lets `go_on` happen before each look; how often
@@ -105,8 +137,9 @@ TEST(TaskStatus, HangsWhereAStageDoesNotReturn) {
   EXPECT_GT(Looks(status, 3, &watch, &now), 0);
   // However slow a busy machine makes it, it goes on.
   int64_t tick = 0;
-  EXPECT_EQ(Looks(status, 1000, &watch, &now, [&] { status.position()->tick.store(1 + ++tick / 100); }),
-            0);
+  EXPECT_EQ(
+      Looks(status, 1000, &watch, &now, [&] { status.position()->tick.store(1 + ++tick / 100); }),
+      0);
 }
 
 // Ctrl-Z, a debugger or a frozen container halt the one who looks, too.
