@@ -154,6 +154,33 @@ TEST(OddFiles, SolesOfTwoKindsBecomeMirrorImagesOfTheBetterFounded) {
   EXPECT_THAT(Told(ImportText("uneven", uneven)), HasSubstr("-> kept; --sole LENGTH WIDTH"));
 }
 
+TEST(OddFiles, WhyWhatCollidesTellsNoSoleIsTold) {
+  const std::string sphere =
+      "<collision><origin xyz='0.06 0 -0.07'/><geometry><sphere radius='0.01'/></geometry>"
+      "</collision>";
+  const std::string seen =
+      "<visual><origin xyz='0.06 0 -0.07'/><geometry><box size='0.2 0.1 0.02'/></geometry>"
+      "</visual>";
+  const std::string reason =
+      "the feet's collision shapes touch flat ground in no area, as spheres do -> the soles are "
+      "of the ";
+  const RobotImport imported = ImportText("round", Replaced(SimpleBiped(), kBox, sphere + seen));
+  EXPECT_THAT(Told(imported), HasSubstr(reason + "visual shapes; --sole LENGTH WIDTH says better"));
+  EXPECT_NEAR(imported.robot.foot(0).length(), 0.2, 1e-9);
+  EXPECT_THAT(Told(ImportText("round_alone", Replaced(SimpleBiped(), kBox, sphere))),
+              HasSubstr(reason + "share of the leg's length;"));
+  // Four of them, one at each corner, are a sole.
+  std::string four;
+  for (const char* const place : {"0.1 0.05", "0.1 -0.05", "-0.1 0.05", "-0.1 -0.05"}) {
+    four += fmt::format(
+        "<collision><origin xyz='{} -0.07'/><geometry><sphere radius='0.01'/></geometry>"
+        "</collision>",
+        place);
+  }
+  EXPECT_THAT(Told(ImportText("corners", Replaced(SimpleBiped(), kBox, four))),
+              Not(HasSubstr("as spheres do")));
+}
+
 TEST(OddFiles, OtherUnitsAreNamed) {
   std::string mm;
   const std::string text = SimpleBiped();

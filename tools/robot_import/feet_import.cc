@@ -42,6 +42,7 @@ class FeetImport {
 
   void Run() {
     std::array<FootSole, 2> soles = {SoleOf(0), SoleOf(1)};
+    TellRound(soles);
     Compare(&soles);
     for (size_t f = 0; f < 2; ++f) {
       FootSole& sole = soles[f];
@@ -71,6 +72,7 @@ class FeetImport {
     FoundSole found;
     std::string from, link;  ///< a link that is named for it, or none
     Sureness sureness = Sureness::kSure;
+    bool round = false;  ///< shapes that collide are there, and touch a plane in no area
   };
 
   void Say(std::string what, std::string value, std::string from, Sureness sureness) {
@@ -83,9 +85,11 @@ class FeetImport {
     const Vector3d down = in_body * -Vector3d::UnitZ(), forward = in_body * Vector3d::UnitX();
     shapes_->Forget();
     FootSole sole;
-    sole.found = FindSole(shapes_->Of(tree_, leg.body, true), down, forward);
+    const std::vector<FootShape> colliding = shapes_->Of(tree_, leg.body, true);
+    sole.found = FindSole(colliding, down, forward);
     sole.from = "collision shapes";
     if (!sole.found.polygon.empty()) return sole;
+    sole.round = !colliding.empty();
     sole.found = FindSole(shapes_->Of(tree_, leg.body, false), down, forward);
     sole.from = "visual shapes";
     sole.sureness = Sureness::kLikely;
@@ -96,6 +100,15 @@ class FeetImport {
     if (!shapes_->missing().empty()) TellMissing(*shapes_->missing().begin());
     sole.found = GuessedSole(leg, sole.link, down, forward);
     return sole;
+  }
+
+  /// Says why what collides does not tell the soles, though it is there.
+  void TellRound(const std::array<FootSole, 2>& soles) {
+    const auto round = std::ranges::find_if(soles, &FootSole::round);
+    if (round == soles.end() || options_.sole) return;
+    result_->defects.push_back(
+        {"the feet's collision shapes touch flat ground in no area, as spheres do",
+         fmt::format("the soles are of the {}; --sole LENGTH WIDTH says better", round->from)});
   }
 
   /// Right and left soles are mirror images: where they are of two kinds, the better founded one
