@@ -68,6 +68,8 @@ class Part {
 
  private:
   const Variable& variable(int i) const { return sweep_.vary(i); }
+  /// Whether the limit is that of one point, whose runs are then told like a sweep's.
+  bool OfOnePoint() const { return sweep_.has_limit() && count() == 0; }
   int count() const { return sweep_.vary_size(); }
   int Find(const std::string& name) const;
   std::optional<double> Value(const SweepRow& row, const std::string& metric) const;
@@ -94,6 +96,9 @@ Json Part::Variables() const {
     }
     json.push_back(std::move(one));
   }
+  if (OfOnePoint()) {
+    json.push_back({{"name", PlainName(sweep_.limit())}, {"unit", UnitOf(sweep_.limit())}});
+  }
   return json;
 }
 
@@ -115,6 +120,7 @@ Json Part::RowJson(const SweepRow& row, const std::string& outcome, const std::s
   for (const SweepValue& value : points_.At(row.run)) {
     json["at"].push_back(value.choice >= 0 ? Json(value.choice) : Json(value.number));
   }
+  if (OfOnePoint()) json["at"].push_back(*row.limit);
   try {
     std::string changes;
     for (const std::string& set : points_.Changes(row.run, row.limit)) {
@@ -155,9 +161,9 @@ Json Part::SweepMaps(Json* same) const {
     maps.push_back(std::move(json));
   }
   if (!maps.empty()) return maps;
-  if (count() == 1) {
+  if (count() == 1 || OfOnePoint()) {
     // Over seeds, which have no order, a point at 0 or 1 for each tells less than the table.
-    if (!IsSeed(variable(0))) maps.push_back({{"x", 0}});
+    if (OfOnePoint() || !IsSeed(variable(0))) maps.push_back({{"x", 0}});
     for (const std::string& metric : header_.columns) {
       std::string sentence = SameSentence(metric);
       if (sentence.empty()) {
@@ -268,7 +274,7 @@ void Part::AddLimits(Json* part) const {
 
 Json SweepChartsPart(const SweepHeader& header, const SweepRows& rows, const std::string& what,
                      const fs::path& folder) {
-  const bool limit = header.sweep.has_limit();
+  const bool limit = header.sweep.has_limit() && header.sweep.vary_size() > 0;
   const Part data(header, rows, folder);
   Json part = {{"name", header.sweep.name()},
                {"kind", limit ? "limit" : "sweep"},

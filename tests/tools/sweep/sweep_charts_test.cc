@@ -167,6 +167,34 @@ TEST_F(SweepChartsTest, OfLimitsEachPointIsARow) {
   EXPECT_EQ(part["rows"][2]["outcome"], "unknown");
 }
 
+TEST_F(SweepChartsTest, OfTheLimitOfOnePointEachValueTriedIsARow) {
+  Limit* const limit = header.sweep.mutable_limit();
+  limit->set_name("force");
+  limit->set_unit("N");
+  limit->set_min(100);
+  limit->set_max(300);
+  limit->set_samples(3);
+  limit->set_tolerance(50);
+  for (const auto& [value, outcome] : {std::pair{100.0, kStands}, std::pair{200.0, kStands},
+                                       std::pair{250.0, kCrashed}, std::pair{300.0, kFell}}) {
+    SweepRow row;
+    row.limit = value;
+    row.outcome = outcome;
+    row.metrics["com_error_max_y"] = value / 10;
+    rows[{0, value}] = row;
+  }
+  const Json part = SweepChartsPart(header, rows);
+  EXPECT_EQ(part["kind"], "sweep");
+  EXPECT_EQ(part["variables"], Json::parse(R"([{"name": "force", "unit": "N"}])"));
+  EXPECT_EQ(part["maps"], Json::parse(R"([{"x": 0}, {"x": 0, "value": 0}])"));
+  ASSERT_EQ(part["rows"].size(), 4u);
+  for (size_t i = 0; i < 4; ++i) {
+    const double value = part["rows"][i]["at"][0];
+    EXPECT_EQ(part["rows"][i]["outcome"], rows.at({0, value}).outcome) << value;
+  }
+  EXPECT_EQ(part["rows"][1]["values"], Json::parse("[20.0, null]"));
+}
+
 TEST_F(SweepChartsTest, TheEdgeOfSurvivalInWords) {
   Vary("push_force", "N", {50, 100, 150, 200, 250});
   for (const bool stands : {true, true, false, true, false}) Add(stands, 1);
