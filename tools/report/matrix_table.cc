@@ -14,6 +14,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr char kNotJudged[] = "–";
+
 std::string ColumnTitle(const MatrixCell& cell) {
   if (!cell.variant.empty()) return "variant " + cell.variant;
   std::string title = cell.ablation;
@@ -66,6 +68,15 @@ std::vector<const CheckResult*> PaperFigures(const std::vector<const MatrixCell*
   return figures;
 }
 
+/// Whether a run lacks a figure of its scenario: variants may have checks of their own.
+bool LacksFigure(const std::vector<const MatrixCell*>& cells) {
+  const std::vector<const CheckResult*> figures = PaperFigures(cells);
+  return std::ranges::any_of(cells, [&](const MatrixCell* cell) {
+    return std::ranges::any_of(
+        figures, [&](const CheckResult* figure) { return FindCheck(*cell, *figure) == nullptr; });
+  });
+}
+
 /// The cells of one scenario.
 std::string FormatScenario(const std::vector<const MatrixCell*>& cells) {
   std::vector<TableRow> rows = {{"what", "paper"}, {"outcome", ""}};
@@ -82,7 +93,8 @@ std::string FormatScenario(const std::vector<const MatrixCell*>& cells) {
       const CheckResult* const check = FindCheck(*cell, *figure);
       const bool failed = check != nullptr && !check->passed;
       const std::string text =
-          check == nullptr ? "" : fmt::format("{}{}", FormatMeasured(*check), failed ? " !" : "");
+          check == nullptr ? kNotJudged
+                           : fmt::format("{}{}", FormatMeasured(*check), failed ? " !" : "");
       row.emplace_back(text, failed ? Tone::kBad : Tone::kPlain);
     }
     rows.push_back(std::move(row));
@@ -210,8 +222,10 @@ std::string FormatMatrix(const std::vector<MatrixCell>& cells) {
   if (!text.empty()) text += "\n";
   const bool failed = std::ranges::any_of(
       cells, [](const MatrixCell& cell) { return !cell.problem && !cell.passed; });
+  bool lacks = false;
   for (const std::vector<const MatrixCell*>& group : ByScenario(cells)) {
     const MatrixCell& first = *group.front();
+    lacks = lacks || LacksFigure(group);
     text += Wrapped(fmt::format("{}{}{}: {}", first.paper_section,
                                 first.paper_section.empty() ? "" : "  ", first.scenario,
                                 first.description),
@@ -226,6 +240,7 @@ std::string FormatMatrix(const std::vector<MatrixCell>& cells) {
                 ScreenStyle().columns, 3) +
             "\n";
   }
+  if (lacks) text += fmt::format("{}: not judged, the run has no such check\n", kNotJudged);
   return text;
 }
 

@@ -122,12 +122,14 @@ TEST_F(MatrixTest, MarksWhatFailedWhereItIsShown) {
   }
   using Words = std::vector<std::string>;
   EXPECT_EQ(rows["outcome"], (Words{"stands", "stands", "!", "stands"})) << result.output;
-  // Columns: the paper's figure, full, and only `seen` has a check of this label.
-  const Words upper = rows["upper"];
-  ASSERT_EQ(upper.size(), 7u) << result.output;
-  EXPECT_EQ((Words{upper[0], upper[1], upper[3], upper[5], upper[6]}),
-            (Words{"1", "N", "N", "N", "!"}));
-  EXPECT_EQ(rows["lower"].size(), 4u) << result.output;
+  // Columns: the paper's figure, full, unseen, seen, and only `seen` has a check of this label.
+  const Words upper = rows["upper"], lower = rows["lower"];
+  ASSERT_EQ(upper.size(), 8u) << result.output;
+  EXPECT_EQ((Words{upper[0], upper[1], upper[3], upper[4], upper[6], upper[7]}),
+            (Words{"1", "N", "N", "–", "N", "!"}));
+  ASSERT_EQ(lower.size(), 6u) << result.output;
+  EXPECT_EQ((Words{lower[4], lower[5]}), (Words{"–", "–"}));
+  EXPECT_NE(result.output.find("\n–: not judged"), std::string::npos) << result.output;
 }
 
 TEST_F(MatrixTest, FailsWhenAnExperimentItselfFails) {
