@@ -97,7 +97,8 @@ LogReplay::LogReplay(const std::string& path) : path_(path), messages_(path) {
 class ReplayedStages {
  public:
   ReplayedStages(const LogReplay& log, const RunSpec& spec, int index,
-                 const ComponentRegistry& registry, ChangedMessages* changed)
+                 const ComponentRegistry& registry, ChangedMessages* changed,
+                 const OnStages& on_stages)
       : log_(log), spec_(spec), instance_(spec.graph().component(index)), changed_(changed) {
     const ComponentFactory* const factory = registry.Find(poise::TypeOf(instance_));
     if (factory == nullptr) {
@@ -107,6 +108,10 @@ class ReplayedStages {
     CheckWiring(spec.graph(), index, component_.wiring);
     for (const Stage& stage : component_.wiring.stages()) Bind(stage);
     CheckLog();
+    if (!on_stages) return;
+    std::vector<std::string> names;
+    for (const Stage& stage : component_.wiring.stages()) names.push_back(stage.name);
+    position_ = on_stages(names);
   }
 
   ReplayedComponent Run() {
@@ -128,6 +133,7 @@ class ReplayedStages {
         act_input_->Place(placed_acts_[next_act].act, t);
       }
       const Tick tick = MakeTick(t, spec_.tick_period(), spec_.lead_ticks());
+      position_->tick.store(t, std::memory_order_relaxed);
       size_t first_output = 0;
       for (BoundStage& stage : stages_) {
         if (t < stage.end) RunStage(&stage, tick, first_output, &result);
@@ -364,7 +370,9 @@ class ReplayedStages {
     for (const Output& output : stage->outputs) {
       output.port->Stamp(spec_.run_id(), tick.index, tick.utime);
     }
+    position_->stage.store(static_cast<int32_t>(stage - stages_.data()), std::memory_order_relaxed);
     stage->stage->run(tick);
+    position_->stage.store(RunPosition::kNoStage, std::memory_order_relaxed);
     for (const Input& input : stage->inputs) input.port->Bind(nullptr);
     for (size_t i = 0; i < stage->outputs.size(); ++i) {
       const Output& output = stage->outputs[i];
@@ -405,14 +413,16 @@ class ReplayedStages {
   SharedObjects shared_;  // of its own, as in a process
   ConfiguredComponent component_;
   std::vector<BoundStage> stages_;
+  RunPosition own_position_;
+  RunPosition* position_ = &own_position_;
   int64_t end_ = 0;
   std::vector<uint8_t> buffer_;
 };
 
 ReplayedComponent LogReplay::Replay(const RunSpec& spec, int index,
-                                    const ComponentRegistry& registry,
-                                    ChangedMessages* changed) const {
-  return ReplayedStages(*this, spec, index, registry, changed).Run();
+                                    const ComponentRegistry& registry, ChangedMessages* changed,
+                                    const OnStages& on_stages) const {
+  return ReplayedStages(*this, spec, index, registry, changed, on_stages).Run();
 }
 
 void LogReplay::Write(const std::string& to, const run_info_t& info,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <span>
 #include <string>
@@ -10,6 +11,7 @@
 
 #include "components/framework/component_registry.h"
 #include "components/framework/graph.pb.h"
+#include "components/framework/runners/run_position.h"
 #include "logging/channel_ticks.h"
 #include "logging/log_messages.h"
 #include "logging/replay/external_messages.h"
@@ -51,6 +53,10 @@ struct ReplayedComponent {
   bool equal() const;
 };
 
+/// Is given the names of a component's stages before they run, and gives what is then kept at the
+/// stage that runs, by its index.
+using OnStages = std::function<RunPosition*(const std::vector<std::string>& stages)>;
+
 /// Replayed messages with other bits than the logged, by channel and tick.
 using ChangedMessages = std::map<std::pair<std::string, int64_t>, std::vector<uint8_t>>;
 
@@ -67,9 +73,10 @@ class LogReplay {
   /// Runs component `index` of `spec` (the log's, or one with other configurations) from tick 0 to
   /// its last logged output. Throws LogError naming channels and ticks that the log lacks for that;
   /// ConfigError or GraphError from the component. What differs is added to `changed`, unless that
-  /// is nullptr.
+  /// is nullptr. `on_stages` may be empty.
   ReplayedComponent Replay(const RunSpec& spec, int index, const ComponentRegistry& registry,
-                           ChangedMessages* changed = nullptr) const;
+                           ChangedMessages* changed = nullptr,
+                           const OnStages& on_stages = {}) const;
 
   /// Writes the log as `to`, with those of `changed` in the place of its own, and `info`. Throws
   /// LogError.

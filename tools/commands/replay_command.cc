@@ -22,6 +22,7 @@
 #include "tools/commands/commands.h"
 #include "tools/report/html_report.h"
 #include "tools/report/run_screen.h"
+#include "tools/run/inline_run.h"
 #include "tools/run/run_dir.h"
 #include "tools/run/scenario_run.h"
 #include "tools/scenario/described_components.h"
@@ -185,8 +186,17 @@ int CompareReplay(const ReplayOptions& options, const std::string& log) {
       continue;
     }
     replayed = true;
+    std::optional<StageWatch> watch;
     const logging::ReplayedComponent component =
-        replay.Replay(spec, index, Components(), dir ? &changed : nullptr);
+        replay.Replay(spec, index, Components(), dir ? &changed : nullptr,
+                      [&](const std::vector<std::string>& names) {
+                        std::vector<InlineRunner::StageName> stages;
+                        for (const std::string& stage : names) {
+                          stages.push_back({spec.graph().component(index).name(), stage});
+                        }
+                        return watch.emplace(spec, stages, [] { return ""; }).position();
+                      });
+    watch.reset();
     Print(component, messages);
     equal = equal && component.equal();
   }

@@ -22,6 +22,7 @@
 #include "tools/live/view_server.h"
 #include "tools/operator/inline_port.h"
 #include "tools/report/html_report.h"
+#include "tools/run/inline_run.h"
 #include "tools/scenario/registry.h"
 
 namespace poise {
@@ -96,9 +97,15 @@ class InteractiveRun {
  private:
   /// A fresh run and its log, before the first tick.
   void Open() {
+    watch_.reset();
     recorder_.reset();  // which the runner's taps call
     runner_ = std::make_unique<InlineRunner>(spec_, Components());
     recorder_ = std::make_unique<logging::InlineRecorder>(log_, spec_, info_, runner_.get());
+    watch_.emplace(spec_, runner_->StageNames(), [this] {
+      recorder_->Flush();
+      return fmt::format("the log has what came before: {}", log_);
+    });
+    runner_->set_position(watch_->position());
     port_.SetRunner(runner_.get());
     runner_->set_tap([this](int channel, const OutputPort& output, const Tick& tick) {
       recorder_->Add(channel, output, tick);
@@ -266,6 +273,7 @@ class InteractiveRun {
   TickRing ring_;
   std::unique_ptr<InlineRunner> runner_;
   std::unique_ptr<logging::InlineRecorder> recorder_;
+  std::optional<StageWatch> watch_;
   std::unique_ptr<ViewServer> server_;
   std::unique_ptr<RunStatus> status_;  // null while the run goes back
   bool finished_ = false;              // status_ has been told of the end

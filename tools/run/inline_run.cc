@@ -6,13 +6,12 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
-#include <condition_variable>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
-#include <mutex>
-#include <thread>
+#include <exception>
+#include <utility>
 #include <vector>
 
 #include "components/framework/clock.h"
@@ -28,76 +27,6 @@
 
 namespace poise {
 namespace {
-
-/// Ends the program where a stage does not return, which nothing else can: it says whose stage, and
-/// leaves the log of what came before.
-class InlineWatch {
- public:
-  /// All outlive the watch. `log_path`: of `recorder`.
-  InlineWatch(const RunSpec& spec, const std::string& log_path, InlineRunner* runner,
-              logging::InlineRecorder* recorder, Progress* progress)
-      : spec_(spec),
-        log_path_(log_path),
-        stages_(runner->StageNames()),
-        recorder_(recorder),
-        progress_(progress) {
-    runner->set_position(&position_);
-    thread_ = std::thread([this] { Run(); });
-  }
-  ~InlineWatch() {
-    {
-      const std::lock_guard lock(mutex_);
-      over_ = true;
-    }
-    changed_.notify_all();
-    thread_.join();
-  }
-  InlineWatch(const InlineWatch&) = delete;
-  InlineWatch& operator=(const InlineWatch&) = delete;
-
- private:
-  void Run() {
-    constexpr std::chrono::milliseconds kLook{200};
-    StallWatch watch;
-    std::unique_lock lock(mutex_);
-    while (!changed_.wait_for(lock, kLook, [this] { return over_; })) {
-      const int32_t stage = position_.stage.load(std::memory_order_relaxed);
-      const int64_t tick = position_.tick.load(std::memory_order_relaxed);
-      const auto stages = static_cast<int64_t>(stages_.size());
-      const int64_t stood = watch.Stood(tick * (stages + 1) + stage, NowNanoseconds());
-      // Between the stages the run writes its log: to wait for the disk there is no stall.
-      if (stage != RunPosition::kNoStage && stood > kStallPatience) End(tick, stage);
-    }
-  }
-  [[noreturn]] void End(int64_t tick, int32_t stage) {
-    progress_->Clear();
-    std::string log = fmt::format("the log has what came before: {}", log_path_);
-    try {
-      recorder_->Flush();
-    } catch (const std::exception& error) {
-      log = error.what();
-    }
-    const InlineRunner::StageName& name = stages_[static_cast<size_t>(stage)];
-    fmt::print(stderr,
-               "poise: run failed: {} hangs: its stage {} has not returned for {} s, at tick {} "
-               "({:.3f} s); {}\n",
-               name.component, name.stage, kStallPatience / 1'000'000'000, tick,
-               MakeTick(tick, spec_.tick_period(), spec_.lead_ticks()).time, log);
-    std::fflush(nullptr);
-    _exit(1);
-  }
-
-  const RunSpec& spec_;
-  const std::string log_path_;
-  const std::vector<InlineRunner::StageName> stages_;
-  logging::InlineRecorder* const recorder_;
-  Progress* const progress_;
-  RunPosition position_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool over_ = false;
-  std::thread thread_;
-};
 
 using Counter = int64_t (*)();
 
@@ -119,6 +48,53 @@ void TellAllocations(const InlineRunner& runner) {
 }
 
 }  // namespace
+
+StageWatch::StageWatch(const RunSpec& spec, std::vector<InlineRunner::StageName> stages,
+                       std::function<std::string()> last_words)
+    : spec_(spec), stages_(std::move(stages)), last_words_(std::move(last_words)) {
+  thread_ = std::thread([this] { Run(); });
+}
+
+StageWatch::~StageWatch() {
+  {
+    const std::lock_guard lock(mutex_);
+    over_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+}
+
+void StageWatch::Run() {
+  constexpr std::chrono::milliseconds kLook{200};
+  StallWatch watch;
+  std::unique_lock lock(mutex_);
+  while (!changed_.wait_for(lock, kLook, [this] { return over_; })) {
+    const int32_t stage = position_.stage.load(std::memory_order_relaxed);
+    const int64_t tick = position_.tick.load(std::memory_order_relaxed);
+    const auto stages = static_cast<int64_t>(stages_.size());
+    const int64_t stood = watch.Stood(tick * (stages + 1) + stage, NowNanoseconds());
+    // Between the stages the run writes its log: to wait for the disk there is no stall.
+    if (stage != RunPosition::kNoStage && stood > kStallPatience) End(tick, stage);
+  }
+}
+
+void StageWatch::End(int64_t tick, int32_t stage) {
+  std::string rest;
+  try {
+    rest = last_words_();
+  } catch (const std::exception& error) {
+    rest = error.what();
+  }
+  const InlineRunner::StageName& name = stages_[static_cast<size_t>(stage)];
+  fmt::print(stderr,
+             "poise: {} hangs: its stage {} has not returned for {} s, at tick {} "
+             "({:.3f} s){}{}\n",
+             name.component, name.stage, kStallPatience / 1'000'000'000, tick,
+             MakeTick(tick, spec_.tick_period(), spec_.lead_ticks()).time, rest.empty() ? "" : "; ",
+             rest);
+  std::fflush(nullptr);
+  _exit(1);
+}
 
 void CountAllocations() {
   if (AllocationCounter() != nullptr) return;
@@ -152,7 +128,12 @@ RunOutcome RunInline(const RunSpec& spec, const std::string& scenario_text,
   }
   logging::InlineRecorder recorder(log_path, spec, info, &runner, kept ? &*kept : nullptr);
   RunOutcome outcome;
-  std::optional<InlineWatch> watch(std::in_place, spec, log_path, &runner, &recorder, progress);
+  std::optional<StageWatch> watch(std::in_place, spec, runner.StageNames(), [&] {
+    progress->Clear();
+    recorder.Flush();
+    return fmt::format("the log has what came before: {}", log_path);
+  });
+  runner.set_position(watch->position());
   const int64_t start = NowNanoseconds();
   int64_t next_flush = start;
   bool more = true;

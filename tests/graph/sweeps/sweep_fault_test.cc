@@ -174,6 +174,26 @@ TEST_F(SweepFaultTest, AnInlineRunThatHangsEndsAndNamesTheStage) {
   EXPECT_GT(fs::file_size(Out("run") + "/run.lcm"), 100'000u);  // what came before
 }
 
+TEST_F(SweepFaultTest, AnInteractiveRunThatHangsEndsAndNamesTheStage) {
+  setenv("POISE_TEST_FAULT", "hang:100", 1);
+  const ProgramResult result = RunPoise({"run", "faulty", "--interactive", "--out", Out("run")});
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  EXPECT_THAT(result.output,
+              HasSubstr("faulty hangs: its stage watch has not returned for 20 s, at tick 100"));
+  EXPECT_GT(fs::file_size(Out("run") + "/run.lcm"), 100'000u);
+}
+
+TEST_F(SweepFaultTest, AReplayThatHangsEndsAndNamesTheStage) {
+  ASSERT_EQ(RunPoise({"run", "faulty", "--inline", "--quiet", "--out", Out("run")}).exit_code, 0);
+  const std::vector<std::string> replay{"replay", Out("run"), "--component", "faulty"};
+  EXPECT_EQ(RunPoise(replay).exit_code, 0);
+  setenv("POISE_TEST_FAULT", "hang:100", 1);
+  const ProgramResult result = RunPoise(replay);
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  EXPECT_THAT(result.output,
+              HasSubstr("faulty hangs: its stage watch has not returned for 20 s, at tick 100"));
+}
+
 // The one that does not answer is named, not the others, which wait for it.
 TEST_F(SweepFaultTest, AProcessThatStandsStillIsTheOneThatIsNamed) {
   unsetenv("POISE_PATH");
