@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 
@@ -93,7 +94,8 @@ int CheckByName(const std::string& name) {
     return kExitOk;
   }
   const LoadedScenario loaded = LoadScenario(file, {});
-  RunSpec spec = MakeRunSpec(loaded, {}, nullptr);
+  std::vector<std::string> warnings;
+  RunSpec spec = MakeRunSpec(loaded, {}, &warnings);
   CheckRun(loaded, &spec);
   std::string variants;
   std::string problems;
@@ -102,16 +104,26 @@ int CheckByName(const std::string& name) {
     changes.variant = variant.name();
     try {
       const LoadedScenario changed = LoadScenario(file, changes);
-      RunSpec changed_spec = MakeRunSpec(changed, changes, nullptr);
+      std::vector<std::string> own;
+      RunSpec changed_spec = MakeRunSpec(changed, changes, &own);
       CheckRun(changed, &changed_spec);
+      for (const std::string& text : own) {
+        if (std::ranges::find(warnings, text) != warnings.end()) continue;
+        warnings.push_back(fmt::format("variant {}: {}", variant.name(), text));
+      }
       variants += ", " + variant.name();
     } catch (const ConfigError& error) {
       // One of a base may not fit what is run: the others are told of all the same.
       problems += fmt::format("variant {}: {}\n", variant.name(), error.what());
     }
   }
-  fmt::print("{} with {}: {} components, {} channels, all good{}\n", loaded.files.file(),
-             loaded.graph_file, spec.graph().component_size(), spec.graph().channel_size(),
+  for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
+  const std::string verdict = warnings.empty()
+                                  ? "all good"
+                                  : fmt::format("good but for {} warning{}", warnings.size(),
+                                                warnings.size() == 1 ? "" : "s");
+  fmt::print("{} with {}: {} components, {} channels, {}{}\n", loaded.files.file(),
+             loaded.graph_file, spec.graph().component_size(), spec.graph().channel_size(), verdict,
              variants.empty() ? "" : "; variants too: " + variants.substr(2));
   ShowRun(spec);
   if (problems.empty()) return kExitOk;

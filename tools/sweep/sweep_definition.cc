@@ -327,7 +327,7 @@ SweepDefinition::SweepDefinition(const SweepArguments& arguments, bool limit)
   CheckFields(source, base, first_limit);
   const RunChanges first = ChangesOf(0, first_limit);
   const LoadedScenario loaded = LoadScenario(scenario_, first);
-  RunSpec spec = MakeRunSpec(loaded, first, nullptr);
+  RunSpec spec = MakeRunSpec(loaded, first, &warnings_);
   CheckRun(loaded, &spec);
   log_size_ = ExpectedLogSize(spec);
 

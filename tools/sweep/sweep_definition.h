@@ -49,6 +49,8 @@ class SweepDefinition {
   const std::string& digest() const { return digest_; }
   /// Bytes that the first run's log takes (ExpectedLogSize).
   int64_t log_size() const { return log_size_; }
+  /// What is odd about the first run (MakeRunSpec).
+  const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
   struct Source;
@@ -65,6 +67,7 @@ class SweepDefinition {
   std::vector<std::string> columns_;
   std::string digest_;
   int64_t log_size_ = 0;
+  std::vector<std::string> warnings_;
 };
 
 /// A digest of this program's file, Poise's library, the modules with the libraries they bring, the

@@ -336,7 +336,12 @@ bool SweepSession::Run(const std::function<std::optional<Request>()>& next,
     const std::string room = RoomForLogs(first.total - first.done);
     if (!room.empty() && !options_.quiet) fmt::print("{}\n", room);
   }
-  if (!writer_) writer_.emplace(folder(), header_, on_disk_);
+  if (!writer_) {
+    writer_.emplace(folder(), header_, on_disk_);
+    for (const std::string& warning : definition_.warnings()) {
+      fmt::print(stderr, "warning: run 0: {}\n", warning);
+    }
+  }
   while (StopSignal() == 0) {
     while (!tasks.full() && failure.empty()) {
       std::optional<Request> request;

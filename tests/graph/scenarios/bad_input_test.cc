@@ -181,6 +181,40 @@ TEST_F(BadInputTest, GraphProblemsComeAllAtOnceWithLines) {
   EXPECT_NE(result.output.find("nobody"), std::string::npos) << result.output;
 }
 
+// What is odd is told before a run, too: by the check, of a sweep's first run.
+TEST_F(BadInputTest, WhatIsOddIsToldBeforeARun) {
+  const TestDeploy deploy;
+  deploy.Scenario("odd",
+                  "base: \"base/stand\" name: \"odd\" duration: 0.1\n"
+                  "variant { name: \"late\" set: \"sim.push[0].start=5\" }\n"
+                  "check { metric: \"push_peak\" }\n");
+  const std::string late = "sim.push[0].start: 5 s is after the run's end, 0.1 s";
+  const ProgramResult checked = RunPoise({"graph", "check", "odd"});
+  EXPECT_EQ(checked.exit_code, 0) << checked.output;
+  EXPECT_THAT(checked.output, HasSubstr("warning: variant late: " + late));
+  EXPECT_THAT(checked.output, HasSubstr("good but for "));
+  const ProgramResult swept =
+      RunPoise({"sweep", "odd", "--variant", "late", "--vary", "sim.push[0].peak=20,40", "--quiet",
+                "--out", folder_ / "sweep"});
+  EXPECT_EQ(swept.exit_code, 0) << swept.output;
+  EXPECT_THAT(swept.output, HasSubstr("warning: run 0: " + late));
+}
+
+TEST_F(BadInputTest, ARobotIsNotImportedBesideAnother) {
+  const std::string maker = POISE_SOURCE_DIR "/deploy/robots/heron/heron.urdf";
+  const auto import = [&](const std::string& name) {
+    return std::vector<std::string>{"robot",           "import", maker, "--to",
+                                    folder_ / "robot", "--name", name};
+  };
+  EXPECT_EQ(RunPoise(import("first")).exit_code, 0);
+  ExpectUsageError(import("second"), {"--to", "first.pbtxt", "--force"});
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "robot/second.pbtxt"));
+  std::vector<std::string> forced = import("second");
+  forced.push_back("--force");
+  EXPECT_EQ(RunPoise(forced).exit_code, 0);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "robot/first.pbtxt"));
+}
+
 TEST_F(BadInputTest, EveryScenarioOfTheHouseIsGood) {
   const std::filesystem::path folder = POISE_SOURCE_DIR "/deploy/scenarios";
   int checked = 0;
@@ -188,6 +222,7 @@ TEST_F(BadInputTest, EveryScenarioOfTheHouseIsGood) {
     if (!entry.is_regular_file()) continue;  // base/: not to be run by themselves
     const ProgramResult result = RunPoise({"graph", "check", entry.path().string()});
     EXPECT_EQ(result.exit_code, 0) << result.output;
+    EXPECT_THAT(result.output, HasSubstr("all good"));
     ++checked;
   }
   EXPECT_GT(checked, 0);
