@@ -85,6 +85,12 @@ std::string WithoutDoubledTypes(const std::string& help) {
   return std::regex_replace(std::regex_replace(help, kChecked, "$1"), kOff, "$1");
 }
 
+/// A list of choices may be longer than a line, which breaks where a space is.
+std::string WithSpacesInLists(const std::string& help) {
+  static const std::regex kComma(R"(,(?=[\w,-]*\}))");
+  return std::regex_replace(help, kComma, ", ");
+}
+
 /// "--inline, --hosted".
 std::string FlagNames(const std::set<CLI::Option*>& options) {
   std::vector<std::string> names;
@@ -124,13 +130,20 @@ std::shared_ptr<CLI::FormatterBase> MakeHelpFormatter() {
   return std::make_shared<HelpFormatter>();
 }
 
+void SetExample(CLI::App* command, const std::string& example) {
+  command->footer(
+      "Exit code: 0 good, 1 a check or the run failed, 2 wrong usage or configuration.\n"
+      "Example: " +
+      example);
+}
+
 std::string HelpText(const CLI::App& app) {
   const int width = ScreenStyle().columns;
   std::string text;
   const CLI::App& command = Named(app);
   const CLI::App* const parent = command.get_parent();
-  const std::string help =
-      WithoutDoubledTypes(command.help(parent == nullptr ? "" : FullName(*parent)));
+  const std::string help = WithSpacesInLists(
+      WithoutDoubledTypes(command.help(parent == nullptr ? "" : FullName(*parent))));
   for (size_t begin = 0; begin < help.size();) {
     const size_t end = std::min(help.find('\n', begin), help.size());
     const std::string line = help.substr(begin, end - begin);

@@ -11,6 +11,9 @@ namespace poise {
 /// its commands are added, which take it over.
 std::shared_ptr<CLI::FormatterBase> MakeHelpFormatter();
 
+/// The footer of a command that says nothing else there: exit codes, and an example of its use.
+void SetExample(CLI::App* command, const std::string& example);
+
 /// The help of the command that was asked about, in the terminal's width.
 std::string HelpText(const CLI::App& app);
 

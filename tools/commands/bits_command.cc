@@ -162,7 +162,8 @@ void AddBitsCommand(CLI::App* app, Command* command) {
                  "record this build's bits anew; say in the commit why they changed");
   bits->footer(
       "Exit code: 0 the same bits; 1 other bits; 3 other bits, and this build has another "
-      "instruction set, compiler or library than the record's.");
+      "instruction set, compiler or library than the record's.\nExample: "
+      "poise bits push_double_support");
   bits->callback([arguments, command] { *command = [arguments] { return Bits(*arguments); }; });
 }
 

@@ -4,6 +4,7 @@
 #include "logging/log_messages.h"
 #include "logging/printable.h"
 #include "logging/replay/compare.h"
+#include "tools/cli/command_line.h"
 #include "tools/commands/commands.h"
 #include "tools/run/run_dir.h"
 
@@ -45,6 +46,7 @@ void AddCompareCommand(CLI::App* app, Command* command) {
       "compare", "compare two runs' messages bit for bit (exit code 1 when they differ)");
   compare->add_option("first", runs->first, "folder of a run or a log")->required();
   compare->add_option("second", runs->second, "folder of a run or a log")->required();
+  SetExample(compare, "poise compare runs/before runs/after");
   compare->callback(
       [runs, command] { *command = [runs] { return CompareRuns(runs->first, runs->second); }; });
 }

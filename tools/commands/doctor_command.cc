@@ -19,6 +19,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/output_style.h"
 #include "tools/commands/commands.h"
 #include "tools/run/run_dir.h"
@@ -183,6 +184,7 @@ int Doctor() {
 void AddDoctorCommand(CLI::App* app, Command* command) {
   CLI::App* doctor =
       app->add_subcommand("doctor", "check network and privileges of this machine, with advice");
+  SetExample(doctor, "poise doctor");
   doctor->callback([command] { *command = Doctor; });
 }
 

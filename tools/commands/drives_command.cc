@@ -9,6 +9,7 @@
 #include "hw_bridge/ethercat/emulator/rotor_chain.h"
 #include "hw_bridge/ethercat/links/socket_link.h"
 #include "tools/cli/cli_checks.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
@@ -169,6 +170,7 @@ void AddDrivesCommand(CLI::App* app, Command* command) {
   emulate->add_option("--duration", options->duration, "s until they end; 0: until Ctrl-C")
       ->capture_default_str()
       ->check(Within("in [0, 1000000]", [](double s) { return s >= 0 && s <= 1e6; }));
+  SetExample(emulate, "poise drives emulate --count 6 --duration 60");
   emulate->callback([options, command] { *command = [options] { return Emulate(*options); }; });
 
   CLI::App* scan = drives->add_subcommand(
@@ -176,6 +178,7 @@ void AddDrivesCommand(CLI::App* app, Command* command) {
       "read a chain and write it as a configuration; slaves go to PRE-OP and back, no torque");
   scan->add_option("--link", options->link, link_help)->capture_default_str();
   scan->add_option("--out", options->out, "file; default: standard output");
+  SetExample(scan, "poise drives scan --out chain.pbtxt");
   scan->callback([options, command] { *command = [options] { return Scan(*options); }; });
 }
 

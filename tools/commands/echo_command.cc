@@ -14,6 +14,7 @@
 #include "logging/log_messages.h"
 #include "poise/health_t.hpp"
 #include "tools/cli/cli_checks.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
 #include "tools/live/message_text.h"
@@ -250,6 +251,7 @@ void AddEchoCommand(CLI::App* app, Command* command) {
                    "at most so many messages a second (of a log: of its time), Hz")
       ->check(Within("in (0, 1e6]", [](double rate) { return rate > 0 && rate <= 1e6; }));
   echo->add_flag("--csv", options->csv, "comma-separated values, with a line of names first");
+  SetExample(echo, "poise echo ROBOT_STATE joint_position --log runs/latest --count 3");
   echo->callback([options, command] { *command = [options] { return Echo(*options); }; });
 }
 

@@ -10,6 +10,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "logging/printable.h"
+#include "tools/cli/command_line.h"
 #include "tools/commands/commands.h"
 #include "tools/operator/bus_port.h"
 #include "tools/run/live_run.h"
@@ -145,6 +146,7 @@ void AddEstopCommand(CLI::App* app, Command* command) {
                     "folder or name of the run, also another user's; default: every run of yours");
   estop->add_flag("--reset", *reset,
                   "end a stop: only once the motors are at rest and no torque is commanded");
+  SetExample(estop, "poise estop runs/latest");
   estop->callback(
       [run, reset, command] { *command = [run, reset] { return Estop(*run, *reset); }; });
 }

@@ -6,6 +6,7 @@
 #include "components/framework/operator_acts.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/output_style.h"
 #include "tools/commands/commands.h"
 #include "tools/scenario/catalog.h"
@@ -141,6 +142,7 @@ void AddGraphCommand(CLI::App* app, Command* command) {
       "check", "check a graph, or a scenario with its graph, robot and configurations");
   check->add_option("name", *name, "graph or scenario: a name or a .pbtxt file")
       ->capture_default_str();
+  SetExample(check, "poise graph check push_double_support");
   check->callback([name, command] { *command = [name] { return CheckByName(*name); }; });
 }
 

@@ -14,6 +14,7 @@
 #include "logging/metrics/metric_needs.h"
 #include "logging/metrics/metrics.h"
 #include "logging/printable.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/output_style.h"
 #include "tools/cli/plain_streams.h"
 #include "tools/commands/commands.h"
@@ -358,6 +359,7 @@ void AddListCommand(CLI::App* app, Command* command) {
   list->add_flag("--folders", request->folders,
                  "of runs: only the folders of those that can be listened to, for scripts");
   list->add_flag("--json", request->json, "of runs: those below runs/, for programs");
+  SetExample(list, "poise list fields sim.push");
   list->callback([request, command] { *command = [request] { return List(*request); }; });
 }
 

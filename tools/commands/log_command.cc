@@ -11,6 +11,7 @@
 #include "logging/replay/log_pack.h"
 #include "logging/run_info.h"
 #include "tools/cli/cli_checks.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/output_style.h"
 #include "tools/cli/signals.h"
@@ -282,6 +283,7 @@ void AddInfo(CLI::App* log, Command* command) {
   auto run = std::make_shared<std::string>();
   CLI::App* info = log->add_subcommand("info", "what run it is of, and its channels");
   AddRun(info, run.get());
+  SetExample(info, "poise log info runs/latest");
   info->callback([run, command] { *command = [run] { return Info(*run); }; });
 }
 
@@ -298,6 +300,7 @@ void AddCheck(CLI::App* log, Command* command) {
   AddRun(check, &options->run);
   check->add_flag("--all", options->all,
                   fmt::format("name every place, not only the first {} of a kind", kPlaces));
+  SetExample(check, "poise log check runs/latest --all");
   check->callback(
       [options, command] { *command = [options] { return Check(options->run, options->all); }; });
 }
@@ -321,6 +324,7 @@ void AddCut(CLI::App* log, Command* command) {
                   "all")
       ->allow_extra_args(false)
       ->take_all();
+  SetExample(cut, "poise log cut runs/latest --from 1 --to 1.2 --out part.lcm");
   cut->callback([options, command] { *command = [options] { return Cut(*options); }; });
 }
 
@@ -334,6 +338,7 @@ void AddExport(CLI::App* log, Command* command) {
   app->add_option("--mcap", options->mcap,
                   "MCAP file: the messages as Protobuf, and what shows the robot in Foxglove");
   app->add_flag("--force", options->force, "replace files of these names");
+  SetExample(app, "poise log export runs/latest --csv csv --mcap run.mcap");
   app->callback([options, command] { *command = [options] { return Export(*options); }; });
 }
 
@@ -345,11 +350,13 @@ void AddPack(CLI::App* log, Command* command) {
       "lockstep without an operator's messages. It is made again first, to see that it is so");
   AddRun(pack, &options->run);
   pack->add_flag("--keep", options->keep, "leave the log");
+  SetExample(pack, "poise log pack runs/latest");
   pack->callback([options, command] { *command = [options] { return Pack(*options); }; });
   auto run = std::make_shared<std::string>();
   CLI::App* unpack = log->add_subcommand(
       "unpack", "make a packed log again; every command that reads a run's log does so too");
   AddRun(unpack, run.get());
+  SetExample(unpack, "poise log unpack runs/latest");
   unpack->callback([run, command] { *command = [run] { return Unpack(*run); }; });
 }
 

@@ -10,6 +10,7 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/output_place.h"
 #include "tools/commands/commands.h"
 #include "tools/scenario/new_scenario.h"
@@ -69,6 +70,7 @@ void AddNewCommand(CLI::App* app, Command* command) {
   scenario->add_option("name", options->name, "letters, digits, _ and -")->required();
   scenario->add_option("--from", options->from,
                        "a copy of this scenario, a name or a .pbtxt file (poise list scenarios)");
+  SetExample(scenario, "poise new scenario my_push --from push_double_support");
   scenario->callback(
       [options, command] { *command = [options] { return NewScenario(*options); }; });
 }

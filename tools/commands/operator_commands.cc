@@ -10,6 +10,7 @@
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "tools/cli/cli_checks.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/terminal.h"
 #include "tools/cli/text_table.h"
 #include "tools/commands/commands.h"
@@ -231,6 +232,7 @@ void AddOperatorCommands(CLI::App* app, Command* command) {
   set->add_flag("--list", set_options->list,
                 "the fields that can be set, with range, present value and meaning");
   set->add_option("--run", set_options->run, kWhichRun);
+  SetExample(set, "poise set task_controller.com.kp=200");
   set->callback(
       [set_options, command] { *command = [set_options] { return SetLiveFields(*set_options); }; });
 
@@ -263,6 +265,7 @@ void AddOperatorCommands(CLI::App* app, Command* command) {
       ->excludes("--together");
   step->add_option("--run", *run, kWhichRun);
   both->excludes("--foot");
+  SetExample(step, "poise step --foot left");
   step->callback([run, foot, next, together, command] {
     *command = [run, foot, next, together] {
       const ActedRun acted = FindActedRun(*run, "poise step");

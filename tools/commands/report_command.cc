@@ -4,6 +4,7 @@
 #include "fmt/format.h"
 #include "logging/printable.h"
 #include "tools/cli/cli_checks.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/progress.h"
 #include "tools/commands/commands.h"
@@ -109,6 +110,7 @@ void AddReportCommand(CLI::App* app, Command* command) {
       ->excludes(no_html);
   report->add_flag("--force", options->force, "replace the file of --html");
   report->add_flag("--full", options->full, "every figure, the events and the assumptions");
+  SetExample(report, "poise report runs/latest --full");
   report->callback([options, command] { *command = [options] { return Report(*options); }; });
 }
 

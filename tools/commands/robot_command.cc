@@ -5,6 +5,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/output_style.h"
 #include "tools/cli/plain_streams.h"
 #include "tools/cli/text_table.h"
@@ -91,6 +92,7 @@ void AddRobotCommand(CLI::App* app, Command* command) {
   check->footer("Example: poise robot check heron/heron --page heron.html");
   check->callback([options, command] { *command = [options] { return CheckOneRobot(*options); }; });
   CLI::App* list = robot->add_subcommand("list", "the robots that there are");
+  SetExample(list, "poise robot list");
   list->callback([command] { *command = ListRobots; });
 }
 

@@ -7,6 +7,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "tools/cli/cli_checks.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
 #include "tools/live/live_start.h"
@@ -96,6 +97,7 @@ void AddRos2Command(CLI::App* app, Command* command) {
   ros2->add_option("--rate", options->rate, "Hz; at most the ticks'")
       ->check(Within("in (0, 10000]", [](double hz) { return hz > 0 && hz <= 10'000; }))
       ->capture_default_str();
+  SetExample(ros2, "poise ros2 --rate 50");
   ros2->callback([options, command] { *command = [options] { return Ros2(*options); }; });
 }
 

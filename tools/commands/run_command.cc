@@ -185,6 +185,16 @@ void AddRunCommand(CLI::App* app, Command* command) {
       run->add_flag("--quiet", options->quiet, "only errors and the verdict, in one line");
   run->add_flag("--full", options->full, "every figure, the events and the assumptions")
       ->excludes(quiet);
+  const auto group = [&](const char* name, std::initializer_list<const char*> flags) {
+    for (const char* const flag : flags) run->get_option(flag)->group(name);
+  };
+  group("What is run", {"--variant", "--without", "--ideal", "--no-reference", "--robot", "--world",
+                        "--set", "--duration", "--seed"});
+  group("In which processes", {"--inline", "--count-allocations", "--interactive", "--port",
+                               "--hosted", "--host", "--drop", "--no-log"});
+  group("In real time", {"--realtime", "--priority", "--cpu", "--kill", "--kill-seed",
+                         "--kill-from", "--kill-until"});
+  group("Drives and ROS 2", {"--drives", "--link", "--capture", "--ros2"});
   run->callback([arguments, command] { *command = [arguments] { return Run(*arguments); }; });
 }
 

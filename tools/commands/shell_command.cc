@@ -4,6 +4,7 @@
 
 #include "components/framework/build_info.h"
 #include "fmt/format.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/shell_text.h"
 #include "tools/commands/commands.h"
 #include "tools/scenario/catalog.h"
@@ -14,26 +15,29 @@ void AddShellCommand(CLI::App* app, Command* command) {
   CLI::App* const shell =
       app->add_subcommand("shell", "print the manual page, or completion for a shell");
   shell->require_subcommand(1);
-  const auto add = [&](const char* name, const char* description,
+  const auto add = [&](const char* name, const char* description, const std::string& example,
                        std::function<std::string(const CLI::App&)> text) {
-    shell->add_subcommand(name, description)->callback([app, command, text = std::move(text)] {
+    CLI::App* const kind = shell->add_subcommand(name, description);
+    SetExample(kind, fmt::format("poise shell {} {}", name, example));
+    kind->callback([app, command, text = std::move(text)] {
       *command = [app, text] {
         fmt::print("{}", text(*app));
         return kExitOk;
       };
     });
   };
-  add("man", "the manual page: poise shell man | man -l -",
+  add("man", "the manual page", "| man -l -",
       [](const CLI::App& root) { return ManPage(root, fmt::format("poise {}", PoiseVersion())); });
-  add("bash", "completion: source <(poise shell bash)", BashCompletion);
-  add("zsh", "completion: poise shell zsh > _poise, in a folder of $fpath", ZshCompletion);
-  add("fish", "completion: poise shell fish | source", FishCompletion);
+  add("bash", "completion: source <(poise shell bash)", "> poise.bash", BashCompletion);
+  add("zsh", "completion, for a folder of $fpath", "> _poise", ZshCompletion);
+  add("fish", "completion", "| source", FishCompletion);
 
   CLI::App* const names = shell->add_subcommand("names", "what there is of a kind, a line each");
   auto kind = std::make_shared<std::string>();
   names->add_option("kind", *kind, "scenarios, robots, graphs, sweeps or drives")
       ->required()
       ->check(CLI::IsMember({"scenarios", "robots", "graphs", "sweeps", "drives"}));
+  SetExample(names, "poise shell names scenarios");
   names->callback([kind, command] {
     *command = [kind] {
       for (const std::string& name : ListNames(*kind)) fmt::print("{}\n", name);

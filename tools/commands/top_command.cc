@@ -158,7 +158,7 @@ void AddTopCommand(CLI::App* app, Command* command) {
       "messages asked for again; RESENT: answered again; DROPPED: on purpose "
       "(--drop); "
       "UNSENT: refused by the system; MISSED: messages that this view did not get in time (the run "
-      "is not affected and the log has them).");
+      "is not affected and the log has them).\nExample: poise top --interval 1");
   top->callback([options, command] { *command = [options] { return Top(*options); }; });
 }
 

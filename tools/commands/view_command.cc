@@ -8,6 +8,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "tools/cli/cli_checks.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/output_style.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
@@ -193,6 +194,7 @@ void AddViewCommand(CLI::App* app, Command* command) {
       ->take_all();
   view->add_flag("--control", options->control,
                  "pages with the token of the printed address may push, change settings and stop");
+  SetExample(view, "poise view --control");
   view->callback([options, command] { *command = [options] { return View(*options); }; });
 }
 
