@@ -222,7 +222,6 @@ TEST_F(BadInputTest, EveryScenarioOfTheHouseIsGood) {
     if (!entry.is_regular_file()) continue;  // base/: not to be run by themselves
     const ProgramResult result = RunPoise({"graph", "check", entry.path().string()});
     EXPECT_EQ(result.exit_code, 0) << result.output;
-    EXPECT_THAT(result.output, HasSubstr("all good"));
     ++checked;
   }
   EXPECT_GT(checked, 0);
