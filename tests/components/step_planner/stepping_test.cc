@@ -340,7 +340,7 @@ TEST_P(ReachCase, NoFootholdIsBeyondWhatBothLegsSpan) {
     };
     for (const Foot foot : kFeet) {
       for (const Crossing crossing : {Crossing::kNone, Crossing::kInFront, Crossing::kBehind}) {
-        const StepPlan plan = choice.At(state, foot, 1 + any(random), place);
+        const StepPlan plan = choice.At(state, foot, 1 + any(random), crossing);
         ASSERT_TRUE(plan.foothold.allFinite());
         if (!std::isfinite(plan.margin)) continue;
         ASSERT_LT(BeyondSpan(reach, foot, from_stance(plan)), far) << trial;
