@@ -17,7 +17,7 @@ namespace poise {
 namespace {
 
 using Eigen::Vector2d;
-using stepping::Place;
+using stepping::Crossing;
 
 stepping::StepChoice Choice() {
   const robot::RobotModel model =
@@ -58,7 +58,7 @@ TEST(FarthestSupport, IsTheFarthestOfFootholdsDrawnAtRandom) {
       // In axes of the stance sole.
       const Vector2d com = -draw(reach.Leg(stance, 1));
       const auto footholds = reach.Footholds(
-          foot, com, std::array{Place::kBeside, Place::kAhead, Place::kBehind}[random() % 3]);
+          foot, com, std::array{Crossing::kNone, Crossing::kInFront, Crossing::kBehind}[random() % 3]);
       if (footholds.num_corners == 0) continue;
       const Vector2d foothold = draw(footholds);
       const auto landed =
