@@ -14,6 +14,7 @@ void ForEveryType(F&& f) {
   f.template operator()<operate::act_t>();
   f.template operator()<operate::answer_t>();
   f.template operator()<steps::footsteps_t>();
+  f.template operator()<steps::stride_t>();
 }
 
 }  // namespace poise

@@ -31,6 +31,7 @@ const std::vector<PortCase>& PortCases() {
       {"stand", "", "", {}},
       {"stand", "", "mujoco", {}},
       {"walk", "", "", {}},
+      {"walk", "", "", {"step_planner.walk.stride_port=true"}},
       {"stand", "", "", {"step_planner.recovery.enabled=true"}},
       {"stand", "ethercat", "", {}},
       {"stand", "unitree", "", {}},
@@ -103,7 +104,7 @@ TEST(Description, SaysThePortsOfEachConfiguration) {
   for (const auto& [name, entry] : Components().entries()) {
     EXPECT_TRUE(types.contains(name)) << name << ": no case above has it";
   }
-  EXPECT_EQ(optional.size(), 3u);
+  EXPECT_EQ(optional.size(), 4u);
   for (const auto& [port, seen] : optional) EXPECT_EQ(seen, (std::set<bool>{false, true})) << port;
 }
 

@@ -131,7 +131,7 @@ TEST_F(BadInputTest, AFormerNameIsAnsweredWithTheNewOne) {
                                 "duration: 0.4 assumption { field: "
                                 "\"sim_ode.push\" kind: \"assumed\" }")},
                 {"assumption[0].field", "write sim.push"});
-  file = Changed("sim {", "state_estimator { method: INVARIANT_EKF } sim {");
+  file = Changed("state_estimator {", "state_estimator { method: INVARIANT_EKF ");
   ExpectRefused({"run", file}, {Line(), "method", "leave it out"});
   Scenario logged;  // of a run that has been such a field is passed over
   ParseLoggedScenario(ReadFile(file), file, &logged);
