@@ -4,7 +4,7 @@
 
 #include "components/framework/run.h"
 #include "fmt/format.h"
-#include "logging/message_scalars.h"
+#include "lcmtypes/message_scalars.h"
 #include "logging/printable.h"
 #include "logging/run_record.h"
 

@@ -8,7 +8,7 @@
 #include "components/framework/run.h"
 #include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
-#include "logging/message_scalars.h"
+#include "lcmtypes/message_scalars.h"
 #include "operate/message_traits.hpp"
 #include "poise/message_traits.hpp"
 

@@ -11,9 +11,9 @@
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "lcmtypes/field_table.h"
+#include "lcmtypes/message_scalars.h"
 #include "logging/export/log_export.h"
 #include "logging/log_messages.h"
-#include "logging/message_scalars.h"
 #include "logging/paged_file.h"
 #include "logging/partial_file.h"
 

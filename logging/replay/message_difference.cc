@@ -7,7 +7,7 @@
 #include <variant>
 
 #include "fmt/format.h"
-#include "logging/message_scalars.h"
+#include "lcmtypes/message_scalars.h"
 
 namespace poise::logging {
 namespace {

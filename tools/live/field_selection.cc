@@ -6,7 +6,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
-#include "logging/message_scalars.h"
+#include "lcmtypes/message_scalars.h"
 #include "tools/reference/value_names.h"
 
 namespace poise {
@@ -87,7 +87,7 @@ std::string Problem(const MessageType& type, const std::vector<Scalar>& scalars,
 std::optional<std::vector<Scalar>> ReadScalars(const MessageType& type,
                                                std::span<const uint8_t> data,
                                                const logging::ElementNames& names) {
-  std::optional<std::vector<logging::MessageScalar>> read = logging::ScalarsOf(type, data);
+  std::optional<std::vector<MessageScalar>> read = ScalarsOf(type, data);
   if (!read) return std::nullopt;
   std::vector<Scalar> scalars;
   for (auto& [path, value] : *read) {

@@ -10,7 +10,7 @@
 
 #include "lcmtypes/message_fields.h"
 
-namespace poise::logging {
+namespace poise {
 
 struct MessageScalar {
   std::string path;  ///< as ScalarVisitor has it
@@ -23,4 +23,4 @@ std::optional<std::vector<MessageScalar>> ScalarsOf(const MessageType& type,
 /// Whether the bytes are exactly one message of this type, without a number that is not finite.
 bool AllFinite(const MessageType& type, std::span<const uint8_t> data);
 
-}  // namespace poise::logging
+}  // namespace poise

@@ -1,9 +1,9 @@
-#include "logging/message_scalars.h"
+#include "lcmtypes/message_scalars.h"
 
 #include <cmath>
 #include <utility>
 
-namespace poise::logging {
+namespace poise {
 namespace {
 
 class Collect final : public ScalarVisitor {
@@ -43,4 +43,4 @@ bool AllFinite(const MessageType& type, std::span<const uint8_t> data) {
   return type.visit(data.data(), static_cast<int64_t>(data.size()), &check) && check.finite;
 }
 
-}  // namespace poise::logging
+}  // namespace poise
