@@ -125,10 +125,15 @@ test('every topic, decoded by its schema: the robot moves as the bus says', asyn
   assert.deepEqual(late.messages['/robot'][0].value, seen.messages['/robot'][0].value);
   assert.equal(count(late, 'ROBOT_STATE'), 0);
   late.client.unsubscribe(0);  // /tf, the first
-  await sleep(200);
-  const before = count(late, '/tf'), others = count(late, '/forces');
-  await late.until((s) => count(s, '/forces') > others + 5);
-  assert.equal(count(late, '/tf'), before);
+  // What was on its way still comes, on a busy machine for a while.
+  const pictured = async () => {
+    const before = count(late, '/tf'), others = count(late, '/forces');
+    await late.until((s) => count(s, '/forces') > others + 5);
+    return count(late, '/tf') - before;
+  };
+  let came = await pictured();
+  for (let tries = 0; came > 0 && tries < 20; ++tries) came = await pictured();
+  assert.equal(came, 0);
   seen.client.close();
   late.client.close();
 });
