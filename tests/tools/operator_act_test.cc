@@ -220,7 +220,12 @@ TEST(ActPortTest, WritesAnActAsTheMessageOfWhoActsOnIt) {
   }
   port.Do(set);
   port.Do(ActOf(OperatorAct::Kind::kStep, 5));
-  ASSERT_EQ(port.messages.size(), 3U);
+  OperatorAct move = ActOf(OperatorAct::Kind::kMove, 6);
+  move.name = "left_knee_pitch";  // the controller says which joints it moves
+  move.value = 0.5;
+  move.duration = 0.1;
+  port.Do(move);
+  ASSERT_EQ(port.messages.size(), 4U);
   const Graph& graph = port.spec().graph();
   const operate::act_t& first = port.messages[0];
   EXPECT_EQ(graph.component(first.component).name(), "sim");
@@ -235,8 +240,14 @@ TEST(ActPortTest, WritesAnActAsTheMessageOfWhoActsOnIt) {
   EXPECT_EQ(second.value, set.value);
   EXPECT_EQ(graph.component(port.messages[2].component).name(), "step_planner");
   EXPECT_LT(port.messages[2].foot, 0);
+  const operate::act_t& last = port.messages[3];
+  EXPECT_EQ(graph.component(last.component).name(), "task_controller");
+  EXPECT_EQ(last.kind, operate::act_t::KIND_JOINT);
+  EXPECT_EQ(last.value, 0.5);
+  EXPECT_EQ(last.duration, std::lround(0.1 / port.spec().tick_period()));
   const std::vector<OperatorAct> answers = port.TakeAnswers();
-  ASSERT_EQ(answers.size(), 3U);
+  ASSERT_EQ(answers.size(), 4U);
+  EXPECT_EQ(answers[3].value, 0.5);  // what was asked for, though the answer's value is 0
   for (const OperatorAct& answer : answers) {
     EXPECT_EQ(answer.state, OperatorAct::State::kAccepted);
     EXPECT_EQ(answer.tick, 100);
@@ -307,9 +318,8 @@ TEST(ControlDeskTest, TellsWhatBecameOfAnAct) {
   EXPECT_EQ(json["control"]["acts"][0]["state"], "accepted");
   EXPECT_EQ(json["control"]["acts"][0]["tick"], 100);
   EXPECT_FALSE(desk.Take("12"));  // nothing has changed
-  EXPECT_EQ(json["control"]["can"],
-            nlohmann::json(
-                {"push", "set", "step", "walk", "stop_walking", "move", "stop", "reset"}));
+  EXPECT_EQ(json["control"]["can"], nlohmann::json({"push", "set", "step", "walk", "stop_walking",
+                                                    "move", "stop", "reset"}));
   // What is beyond a page is refused before anybody receives it.
   const size_t sent = port.messages.size();
   ASSERT_TRUE(desk.Receive(

@@ -343,7 +343,8 @@ int8_t ActPort::HearAnswer(std::span<const uint8_t> data) {
   });
   if (found == waiting_.end()) return answer.kind;
   if (answer.verdict == answer_t::VERDICT_LATE && Again(&*found)) return answer.kind;
-  if (answer.verdict == answer_t::VERDICT_DONE) found->act.value = answer.value;
+  const bool tells = found->act.kind == ActKind::kSet || found->act.kind == ActKind::kAsk;
+  if (tells && answer.verdict == answer_t::VERDICT_DONE) found->act.value = answer.value;
   Answer(answer.id, answer.tick, Reason(found->act, answer));
   return answer.kind;
 }
