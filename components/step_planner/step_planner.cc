@@ -165,8 +165,9 @@ int8_t StepPlanner::Act(const operate::act_t& act, double time) {
       if (makes_steps_ && owner_ != FeetOwner::kWalk) {
         const bool stands = Count(in_contact_) == 2 && last_controlled_;
         const bool rests = stands && owner_ != FeetOwner::kRecovery;
-        if (!walks_quasi_static_ && !rests && !recovery_.command().stepping)
+        if (!walks_quasi_static_ && !rests && !recovery_.command().stepping) {
           return answer_t::VERDICT_NOT_NOW;
+        }
         if (rests) recovery_.BringTogether();
       }
       operator_walk_ = {.given = true};

@@ -117,10 +117,10 @@ class StepPlanner : public Component, public Operated {
   robot::FootArray<Landing> landing_{Landing(contact_)};
   robot::FootArray<ContactLoss> contact_loss_{ContactLoss(contact_)};
   HeldCondition step_needed_;
-  bool makes_steps_ = false;  // steps are made
+  bool makes_steps_ = false;  // recovery_ is there
   stepping::Recovery recovery_;
-  bool walks_quasi_static_ = false;  // quasi-statically, where it is told to
-  bool walks_by_steps_ = false;      // it walks by the recovery's steps
+  bool walks_quasi_static_ = false;  // by walk_
+  bool walks_by_steps_ = false;      // by recovery_
   bool stride_port_ = false;
   stepping::WalkCommand planned_;  // of the port's last message
   stepping::QuasiStaticWalk walk_;

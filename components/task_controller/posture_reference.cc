@@ -28,16 +28,17 @@ bool Keeps(const Quintic& move, const Quintic::Point& from, double start, double
 
 }  // namespace
 
-PostureReference::PostureReference(const balance::JointLimits& limits, const std::vector<char>& leg,
+PostureReference::PostureReference(const balance::JointLimits& limits, std::span<const int> legs,
                                    double tick_period)
-    : leg_(leg),
+    : leg_(static_cast<size_t>(limits.num_joints()), 0),
       tick_period_(tick_period),
-      move_(leg.size()),
-      moves_(leg.size(), 0),
+      move_(leg_.size()),
+      moves_(leg_.size(), 0),
       position_(Eigen::VectorXd::Zero(limits.num_joints())),
       velocity_(position_),
       acceleration_(position_) {
   for (int j = 0; j < limits.num_joints(); ++j) range_.push_back(limits.range(j));
+  for (const int joint : legs) leg_[static_cast<size_t>(joint)] = 1;
 }
 
 void PostureReference::Hold(const Eigen::VectorXd& position) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 #include "components/balance/joint_limits.h"
@@ -15,9 +16,9 @@ namespace poise {
 /// arms, hands, head, waist. Never allocates after construction.
 class PostureReference {
  public:
-  /// `limits`: what a move keeps to. `leg`: joints between the base and a foot, which stay.
+  /// `limits`: what a move keeps to. `legs`: joints between the base and a foot, which stay.
   /// `tick_period`: s.
-  PostureReference(const balance::JointLimits& limits, const std::vector<char>& leg,
+  PostureReference(const balance::JointLimits& limits, std::span<const int> legs,
                    double tick_period);
 
   /// All joints rest at `position`, rad, n×1.

@@ -81,12 +81,10 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
       leg_[f][static_cast<size_t>(joint)] = 1;
     }
   }
-  std::vector<char> stays = leg_[Foot::kRight];
-  for (size_t j = 0; j < stays.size(); ++j) stays[j] |= leg_[Foot::kLeft][j];
-  posture_.emplace(limits, stays, context.tick_period);
 
   whole_body_ = context.shared->Get<balance::WholeBody>(
       "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
+  posture_.emplace(limits, whole_body_->contact().legs(), context.tick_period);
   state_ = robot::RobotState(num_joints);
   posture_acceleration_ = posture_torque_ = torque_ = free_torque_ =
       Eigen::VectorXd::Zero(num_joints);

@@ -133,8 +133,8 @@ class Environment:
         """Sends joints that no leg needs, arms, hands, head or waist, to `angles`, {name: rad}, from the next tick on.
 
         Each comes to rest there in `duration` s, longer where its limits of velocity and acceleration ask for it, from whatever
-        motion it is in: who sends a target each 0.02 s, as a teleoperator or a policy does, takes some 0.1 s. The balance is
-        kept meanwhile, with what the moving joints ask for in the torques.
+        motion it is in: who sends a target each 0.02 s, as a teleoperator or a policy does, takes some 0.1 s. The controller's
+        dynamics have the moving joints; it keeps the balance as far as soles and torques allow.
         """
         for joint, angle in angles.items():
             self._session.move(joint, float(angle), float(duration))

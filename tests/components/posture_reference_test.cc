@@ -3,9 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <optional>
-#include <vector>
 
 #include "operate/answer_t.hpp"
 #include "tests/components/control_fixture.h"
@@ -21,9 +21,7 @@ constexpr int kLeg = 0;
 class PostureReferenceTest : public testing::Test {
  protected:
   PostureReferenceTest() : limits_(model_, kTickPeriod) {
-    std::vector<char> leg(static_cast<size_t>(model_.num_joints()), 0);
-    leg[kLeg] = 1;
-    posture_.emplace(limits_, leg, kTickPeriod);
+    posture_.emplace(limits_, std::array{kLeg}, kTickPeriod);
     posture_->Hold(Eigen::VectorXd::Zero(model_.num_joints()));
   }
 

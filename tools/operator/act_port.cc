@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "components/balance/joint_limits.h"
+#include "components/balance/whole_body.h"
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_reference.h"
 #include "components/framework/configuration/suggest.h"
@@ -152,13 +153,11 @@ const ActPort::Targets& ActPort::targets() const {
   targets.weight = model.total_mass() * robot::kGravity;
   for (const auto& body : model.bodies()) targets.bodies.push_back(body.name);
   for (const auto& foot : model.feet()) targets.feet.push_back(foot.name);
-  std::vector<bool> leg(static_cast<size_t>(model.num_joints()), false);
-  for (const auto& foot : model.feet()) {
-    for (const int joint : model.supporting_joints(foot.body))
-      leg[static_cast<size_t>(joint)] = true;
-  }
+  const balance::ContactDynamics dynamics = balance::MakeContactDynamics(model);
   for (const auto& joint : model.joints()) {
-    if (!leg[targets.joints.size()] && targets.tasks >= 0) {
+    const auto index = static_cast<int>(targets.joints.size());
+    const bool leg = std::ranges::find(dynamics.legs(), index) != dynamics.legs().end();
+    if (!leg && targets.tasks >= 0) {
       const balance::PositionRange range(joint);
       targets.movable.push_back({joint.name, range.lower, range.upper});
     }

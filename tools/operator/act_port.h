@@ -43,8 +43,8 @@ class ActPort {
   ActPort& operator=(const ActPort&) = delete;
 
   /// Passes it on; its answer comes by TakeAnswers, and it is in force only when that says so.
-  /// Throws ConfigError on what no receiver could take: unknown body, field, foot, joint; not finite; a
-  /// graph without operator's channels; too many that wait.
+  /// Throws ConfigError on what no receiver could take: unknown body, field, foot or joint; not
+  /// finite; a graph without operator's channels; too many that wait.
   virtual void Do(OperatorAct act);
   /// Takes what has come and sends again what waits; waits up to `timeout_ms` for answers. Call it
   /// at least every 20 ms while an act waits.

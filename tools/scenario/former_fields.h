@@ -14,7 +14,7 @@ std::string FormerField(std::string_view path);
 
 /// ParseTextProto of a scenario: its error says what to do about a former name.
 void ParseScenario(std::string_view text, std::string_view source, Scenario* scenario);
-/// Likewise of a run that has been: fields that went with what they were of are passed over.
+/// Parses the scenario of a run that has been, and passes over fields that went with what they set.
 void ParseLoggedScenario(std::string_view text, std::string_view source, Scenario* scenario);
 
 }  // namespace poise

@@ -54,8 +54,8 @@ struct StepStatus {
   StepReason reason = StepReason::kNone;               ///< of the step under way, or the last
   Foot foot = Foot::kRight;                            ///< that steps, or last did
   Eigen::Vector2d foothold = Eigen::Vector2d::Zero();  ///< m, world, of that step
-  double touch_down =
-      -1;             ///< s, planned, of the foot that is in the air or about to be; −1: none is
+  /// s, planned, of the foot that is in the air or about to leave; −1: none is.
+  double touch_down = -1;
   double margin = 0;  ///< StepPlan's
 };
 
