@@ -2,6 +2,7 @@
 
 A reader has the page and the beginning of a table's heading. It asks the task for runs of the commands that the page
 tells, with a row's flags and the capitals of the page filled in, and puts figures into cells. No command stands here.
+The file is as long as there are tables: a table is a reader, found by its page and heading.
 """
 
 import functools

@@ -27,6 +27,16 @@ class SweepChartsTest : public ::testing::Test {
     for (const double value : values) variable->add_value(value);
     return variable;
   }
+  /// Looks for the largest force that is survived, 100 to 300 N, first at three values.
+  void LimitForce(double tolerance) {
+    Limit* const limit = header.sweep.mutable_limit();
+    limit->set_name("force");
+    limit->set_unit("N");
+    limit->set_min(100);
+    limit->set_max(300);
+    limit->set_samples(3);
+    limit->set_tolerance(tolerance);
+  }
   /// The next run of the grid.
   SweepRow& Add(bool stands, double error) {
     SweepRow row;
@@ -132,13 +142,7 @@ TEST_F(SweepChartsTest, ARowHasTheCommandThatMakesItsRunAgainAndWhereItWasKept) 
 
 TEST_F(SweepChartsTest, OfLimitsEachPointIsARow) {
   Vary("direction", "", {0, 90, 180})->set_angle(true);
-  Limit* const limit = header.sweep.mutable_limit();
-  limit->set_name("force");
-  limit->set_unit("N");
-  limit->set_min(100);
-  limit->set_max(300);
-  limit->set_samples(3);
-  limit->set_tolerance(100);
+  LimitForce(100);
   const auto tried = [&](int64_t run, double value, const char* outcome) {
     SweepRow row;
     row.run = run;
@@ -168,13 +172,7 @@ TEST_F(SweepChartsTest, OfLimitsEachPointIsARow) {
 }
 
 TEST_F(SweepChartsTest, OfTheLimitOfOnePointEachValueTriedIsARow) {
-  Limit* const limit = header.sweep.mutable_limit();
-  limit->set_name("force");
-  limit->set_unit("N");
-  limit->set_min(100);
-  limit->set_max(300);
-  limit->set_samples(3);
-  limit->set_tolerance(50);
+  LimitForce(50);
   for (const auto& [value, outcome] : {std::pair{100.0, kStands}, std::pair{200.0, kStands},
                                        std::pair{250.0, kCrashed}, std::pair{300.0, kFell}}) {
     SweepRow row;
