@@ -3,6 +3,7 @@
 //   crash:TICK   SIGSEGV
 //   throw:TICK   an exception
 //   exit:TICK    exit(0)
+//   nan:TICK     an output that is not finite
 //   slip:SPEED   SIGSEGV as soon as the base moves faster, m/s
 // With POISE_TEST_FAULT_ONCE only where that file is not there yet; the fault makes it.
 #include <unistd.h>
@@ -12,6 +13,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 
@@ -49,6 +51,10 @@ class Faulty : public poise::Component {
     }
     if (kind == "throw") throw std::runtime_error("no reason");
     if (kind == "exit") std::exit(0);
+    if (kind == "nan") {
+      watched_->force[0] = std::numeric_limits<double>::quiet_NaN();
+      return;
+    }
     if (kind != "hang") std::raise(SIGSEGV);
     for (std::atomic<bool> go{true}; go.load();) continue;
   }

@@ -186,7 +186,8 @@ SweepRow RunPoint(const std::string& scenario, const RunChanges& changes,
   }
   row.ended_at = run.time(run.num_ticks);
   row.phase = PhaseAtEnd(run);
-  for (const std::string& name : metrics) {
+  // Of a run that did not end by itself no figure is one: its `fallen` would be 0.
+  for (const std::string& name : row.survived() ? metrics : std::vector<std::string>()) {
     const logging::Metric* const metric = logging::FindMetric(name);
     status->Step();
     const logging::Answer value = metric->compute(run);

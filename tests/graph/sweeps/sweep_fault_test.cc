@@ -100,6 +100,23 @@ TEST_F(SweepFaultTest, AnExceptionAndAnExitAreCrashesOfTheirStage) {
   }
 }
 
+// A run that was stopped had not fallen until then, which says nothing.
+TEST_F(SweepFaultTest, OfARunThatWasStoppedNoFigureIsTold) {
+  setenv("POISE_TEST_FAULT", "nan:100", 1);
+  const ProgramResult result =
+      RunPoise({"sweep", "faulty", "--vary", "duration=0.1,0.3", "--column", "fallen", "--column",
+                "push_peak", "--out", Out("out")});
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  const std::vector<CsvRow> rows = ReadCsv(Out("out") + "/table.csv");
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].at("outcome"), "stands");
+  EXPECT_EQ(rows[0].at("fallen"), "0");
+  EXPECT_EQ(rows[1].at("outcome"), "stopped");
+  EXPECT_THAT(rows[1].at("reason"), HasSubstr("not finite"));
+  EXPECT_EQ(rows[1].at("fallen"), "");
+  EXPECT_EQ(rows[1].at("push_peak"), "");
+}
+
 TEST_F(SweepFaultTest, WhatCrashesOnceOnlyIsMadeOnceMore) {
   const std::vector<std::string> sweep = {"sweep",  "faulty", "--vary", "sim.push[0].peak=20,40",
                                           "--jobs", "1",      "--out"};
