@@ -58,6 +58,8 @@ class OdeWorld : public World {
 
   /// Steps that TreeStep gave up.
   int64_t given_up_steps() const { return given_up_steps_; }
+  /// Times that the last step set the bounds of friction (TreeStep); 0 without contacts.
+  int friction_rounds() const { return tree_.friction_rounds(); }
 
  private:
   Softness SoftnessOf(const ContactMaterial& material) const;

@@ -14,6 +14,13 @@ using Eigen::Index;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
+// Share of the load by which the bounds of friction may be off, rounds at most until they are not,
+// and rounds after which they go half the way.
+constexpr double kBoundsOff = 0.05;
+constexpr int kMostRounds = 20, kWholeRounds = 4;
+
+int RowsOf(const TreeStep::Contact& contact) { return contact.friction > 0 ? 3 : 1; }
+
 Matrix3d Cross(const Vector3d& v) {
   Matrix3d cross;
   cross << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
@@ -219,6 +226,39 @@ TreeStep::Matrix6d TreeStep::CrossResponse(size_t a, size_t b) const {
   return moved.lazyProduct(to_b.transpose());
 }
 
+bool TreeStep::SolveFriction(std::span<const Contact> contacts, Index rows, double* off) {
+  Index row = 0;
+  for (size_t c = 0; c < contacts.size(); ++c) {
+    const double most = contacts[c].friction * normal_impulses_[static_cast<Index>(c)];
+    for (int k = 0; k < RowsOf(contacts[c]); ++k, ++row) {
+      lower_[row] = k == 0 ? 0 : -most;
+      upper_[row] = k == 0 ? std::numeric_limits<double>::infinity() : most;
+    }
+  }
+  if (!all_.Solve(system_.topLeftCorner(rows, rows), wanted_.head(rows), lower_.head(rows),
+                  upper_.head(rows), impulses_.head(rows))) {
+    return false;
+  }
+  double load = 0, moved = 0;
+  row = 0;
+  for (size_t c = 0; c < contacts.size(); ++c) {
+    const double normal = impulses_[row];
+    double& assumed = normal_impulses_[static_cast<Index>(c)];
+    bool met = false;  // a bound, or what it should have been
+    for (int k = 1; k < RowsOf(contacts[c]); ++k) {
+      const double along = std::abs(impulses_[row + k]);
+      met = met || along >= upper_[row + k] || along > contacts[c].friction * normal;
+    }
+    load += normal;
+    if (met) moved += std::abs(normal - assumed);
+    // Half the way, where they would go to and fro.
+    assumed += (friction_rounds_ < kWholeRounds ? 1 : 0.5) * (normal - assumed);
+    row += RowsOf(contacts[c]);
+  }
+  *off = load > 0 ? moved / load : 0;
+  return true;
+}
+
 bool TreeStep::SolveContacts(std::span<const Contact> contacts) {
   normal_.clear();
   Index n = 0, normals = 0;
@@ -230,7 +270,7 @@ bool TreeStep::SolveContacts(std::span<const Contact> contacts) {
     velocity.head<3>() += body.linear + body.angular.cross(nodes_[b].arm);
     velocity.tail<3>() += body.angular;
     const auto normal = static_cast<int>(n);
-    for (size_t k = 0; k < (contact.friction > 0 ? 3 : 1); ++k, ++n) {
+    for (size_t k = 0; k < static_cast<size_t>(RowsOf(contact)); ++k, ++n) {
       const Vector3d& direction = contact.directions[k];
       rows_.row(n) << direction.transpose(), arm.cross(direction).transpose();
       wanted_[n] = (k == 0 ? contact.velocity : 0) - rows_.row(n).dot(velocity);
@@ -238,7 +278,6 @@ bool TreeStep::SolveContacts(std::span<const Contact> contacts) {
     }
     ++normals;
   }
-  const auto rows_of = [&](const Contact& contact) { return contact.friction > 0 ? 3 : 1; };
   for (const int b : contact_bodies_) {
     Index row = 0;
     for (const int a : contact_bodies_) {
@@ -247,13 +286,13 @@ bool TreeStep::SolveContacts(std::span<const Contact> contacts) {
       const Matrix6d response = i == j ? nodes_[i].response : CrossResponse(i, j);
       row = 0;
       for (const Contact& at : contacts) {
-        const int count = rows_of(at);
+        const int count = RowsOf(at);
         if (at.body == a) {
           moved_.middleRows(row, count).noalias() =
               rows_.middleRows(row, count).lazyProduct(response);
           Index column = 0;
           for (const Contact& from : contacts) {
-            const int width = rows_of(from);
+            const int width = RowsOf(from);
             if (from.body == b) {
               for (int r = 0; r < count; ++r) {
                 for (int c = 0; c < width; ++c) {
@@ -273,38 +312,31 @@ bool TreeStep::SolveContacts(std::span<const Contact> contacts) {
   Index normal_row = 0, row = 0;
   for (const Contact& contact : contacts) {
     system_(row, row) += contact.cfm / step_;
-    for (int k = 1; k < rows_of(contact); ++k) system_(row + k, row + k) += cfm_;
+    for (int k = 1; k < RowsOf(contact); ++k) system_(row + k, row + k) += cfm_;
     Index normal_column = 0, column = 0;
     for (const Contact& other : contacts) {
       normal_system_(normal_row, normal_column++) = system_(row, column);
-      column += rows_of(other);
+      column += RowsOf(other);
     }
     normal_wanted_[normal_row++] = wanted_[row];
-    row += rows_of(contact);
+    row += RowsOf(contact);
   }
   if (!normals_.Solve(normal_system_.topLeftCorner(normals, normals), normal_wanted_.head(normals),
                       zero_.head(normals), infinite_.head(normals),
                       normal_impulses_.head(normals))) {
     return false;
   }
-  row = 0;
-  for (size_t c = 0; c < contacts.size(); ++c) {
-    const double most = contacts[c].friction * normal_impulses_[static_cast<Index>(c)];
-    for (int k = 0; k < rows_of(contacts[c]); ++k, ++row) {
-      lower_[row] = k == 0 ? 0 : -most;
-      upper_[row] = k == 0 ? std::numeric_limits<double>::infinity() : most;
-    }
-  }
-  if (!all_.Solve(system_.topLeftCorner(n, n), wanted_.head(n), lower_.head(n), upper_.head(n),
-                  impulses_.head(n))) {
-    return false;
+  double off = 1;
+  for (friction_rounds_ = 0; friction_rounds_ < kMostRounds && off > kBoundsOff;
+       ++friction_rounds_) {
+    if (!SolveFriction(contacts, n, &off)) return false;
   }
   for (size_t i = 0; i < nodes_.size(); ++i) nodes_[i].impulse = nodes_[i].outside;
   row = 0;
   for (size_t c = 0; c < contacts.size(); ++c) {
     Vector3d impulse = Vector3d::Zero();
     Vector6d& to = nodes_[static_cast<size_t>(contacts[c].body)].impulse;
-    for (int k = 0; k < rows_of(contacts[c]); ++k, ++row) {
+    for (int k = 0; k < RowsOf(contacts[c]); ++k, ++row) {
       impulse += impulses_[row] * contacts[c].directions[static_cast<size_t>(k)];
       to += impulses_[row] * rows_.row(row).transpose();
     }
@@ -321,6 +353,7 @@ bool TreeStep::Solve(std::span<const Contact> contacts) {
   }
   base_.compute(nodes_[0].inertia);
   if (base_.info() != Eigen::Success) return false;
+  friction_rounds_ = 0;
   if (!contacts.empty()) {
     FindResponses(contacts);
     Accelerate(true);
