@@ -226,7 +226,8 @@ TreeStep::Matrix6d TreeStep::CrossResponse(size_t a, size_t b) const {
   return moved.lazyProduct(to_b.transpose());
 }
 
-bool TreeStep::SolveFriction(std::span<const Contact> contacts, Index rows, double* off) {
+std::optional<double> TreeStep::SolveFriction(std::span<const Contact> contacts, Index rows,
+                                              int round) {
   Index row = 0;
   for (size_t c = 0; c < contacts.size(); ++c) {
     const double most = contacts[c].friction * normal_impulses_[static_cast<Index>(c)];
@@ -237,7 +238,7 @@ bool TreeStep::SolveFriction(std::span<const Contact> contacts, Index rows, doub
   }
   if (!all_.Solve(system_.topLeftCorner(rows, rows), wanted_.head(rows), lower_.head(rows),
                   upper_.head(rows), impulses_.head(rows))) {
-    return false;
+    return {};
   }
   double load = 0, moved = 0;
   row = 0;
@@ -251,12 +252,11 @@ bool TreeStep::SolveFriction(std::span<const Contact> contacts, Index rows, doub
     }
     load += normal;
     if (met) moved += std::abs(normal - assumed);
-    // Half the way, where they would go to and fro.
-    assumed += (friction_rounds_ < kWholeRounds ? 1 : 0.5) * (normal - assumed);
+    // Half the way ends what would go to and fro.
+    assumed += (round < kWholeRounds ? 1 : 0.5) * (normal - assumed);
     row += RowsOf(contacts[c]);
   }
-  *off = load > 0 ? moved / load : 0;
-  return true;
+  return load > 0 ? moved / load : 0;
 }
 
 bool TreeStep::SolveContacts(std::span<const Contact> contacts) {
@@ -270,8 +270,8 @@ bool TreeStep::SolveContacts(std::span<const Contact> contacts) {
     velocity.head<3>() += body.linear + body.angular.cross(nodes_[b].arm);
     velocity.tail<3>() += body.angular;
     const auto normal = static_cast<int>(n);
-    for (size_t k = 0; k < static_cast<size_t>(RowsOf(contact)); ++k, ++n) {
-      const Vector3d& direction = contact.directions[k];
+    for (int k = 0; k < RowsOf(contact); ++k, ++n) {
+      const Vector3d& direction = contact.directions[static_cast<size_t>(k)];
       rows_.row(n) << direction.transpose(), arm.cross(direction).transpose();
       wanted_[n] = (k == 0 ? contact.velocity : 0) - rows_.row(n).dot(velocity);
       normal_.push_back(k == 0 ? -1 : normal);
@@ -326,10 +326,10 @@ bool TreeStep::SolveContacts(std::span<const Contact> contacts) {
                       normal_impulses_.head(normals))) {
     return false;
   }
-  double off = 1;
-  for (friction_rounds_ = 0; friction_rounds_ < kMostRounds && off > kBoundsOff;
+  for (std::optional<double> off = 1; friction_rounds_<kMostRounds&& * off> kBoundsOff;
        ++friction_rounds_) {
-    if (!SolveFriction(contacts, n, &off)) return false;
+    off = SolveFriction(contacts, n, friction_rounds_);
+    if (!off) return false;
   }
   for (size_t i = 0; i < nodes_.size(); ++i) nodes_[i].impulse = nodes_[i].outside;
   row = 0;

@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -102,8 +103,10 @@ class TreeStep {
   Matrix6d CrossResponse(size_t a, size_t b) const;
   bool SolveContacts(std::span<const Contact> contacts);
   /// Sets the bounds of friction by the normal impulses, solves all rows, and takes the normal
-  /// impulses from them. False: not solved.
-  bool SolveFriction(std::span<const Contact> contacts, Eigen::Index rows, double* off);
+  /// impulses from them; the `round`-th time in this step. Returns by which share of the load the
+  /// bounds that are met were off; empty: not solved.
+  std::optional<double> SolveFriction(std::span<const Contact> contacts, Eigen::Index rows,
+                                      int round);
 
   std::vector<Body> bodies_;
   double step_, pull_, cfm_;  // pull_: erp / step; cfm_: over the step

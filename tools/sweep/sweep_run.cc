@@ -186,12 +186,14 @@ SweepRow RunPoint(const std::string& scenario, const RunChanges& changes,
   }
   row.ended_at = run.time(run.num_ticks);
   row.phase = PhaseAtEnd(run);
-  // Of a run that did not end by itself no figure is one: its `fallen` would be 0.
-  for (const std::string& name : row.survived() ? metrics : std::vector<std::string>()) {
-    const logging::Metric* const metric = logging::FindMetric(name);
-    status->Step();
-    const logging::Answer value = metric->compute(run);
-    if (value && std::isfinite(*value)) row.metrics[metric->name] = *value;
+  // A run that was stopped tells nothing: its `fallen` would be 0.
+  if (row.survived()) {
+    for (const std::string& name : metrics) {
+      const logging::Metric* const metric = logging::FindMetric(name);
+      status->Step();
+      const logging::Answer value = metric->compute(run);
+      if (value && std::isfinite(*value)) row.metrics[metric->name] = *value;
+    }
   }
   status->Step();
   if (row.stands() && !required.empty()) Judge(merged, required, run, &row);

@@ -34,7 +34,7 @@ struct SweepRow {
   std::string reason;  ///< why it ended early, or what it missed
   /// Whose stage a run was in when it was stopped, crashed or hung; empty: none's, or not known.
   std::string component, stage;
-  std::map<std::string, double> metrics;  ///< none of a run that does not tell (survived)
+  std::map<std::string, double> metrics;  ///< empty where survived() is
   std::optional<PushBound> push;
 
   bool stands() const { return outcome == kStands; }

@@ -100,8 +100,8 @@ TEST_F(SweepFaultTest, AnExceptionAndAnExitAreCrashesOfTheirStage) {
   }
 }
 
-// A run that was stopped had not fallen until then, which says nothing.
-TEST_F(SweepFaultTest, OfARunThatWasStoppedNoFigureIsTold) {
+// That a run had not fallen before it was stopped says nothing.
+TEST_F(SweepFaultTest, ARunThatWasStoppedHasNoMetrics) {
   setenv("POISE_TEST_FAULT", "nan:100", 1);
   const ProgramResult result =
       RunPoise({"sweep", "faulty", "--vary", "duration=0.1,0.3", "--column", "fallen", "--column",
