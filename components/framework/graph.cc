@@ -522,13 +522,16 @@ ConfiguredComponent ConfigureComponent(const RunSpec& spec, int index,
   return result;
 }
 
-BoundGraph::BoundGraph(const RunSpec& spec, const ComponentRegistry& registry) {
+BoundGraph::BoundGraph(const RunSpec& spec, const ComponentRegistry& registry,
+                       std::atomic<int>* configuring) {
   if (!(spec.tick_period() > 0)) throw ConfigError("run: tick_period must be greater than 0");
   CheckGraph(spec.graph(), registry);
   std::vector<const Wiring*> wirings;
   for (int i = 0; i < spec.graph().component_size(); ++i) {
     const ComponentFactory* factory = registry.Find(TypeOf(spec.graph().component(i)));
+    if (configuring != nullptr) configuring->store(i);
     components_.push_back(ConfigureComponent(spec, i, *factory, &shared_));
+    if (configuring != nullptr) configuring->store(-1);
   }
   Problems problems;
   for (int i = 0; i < num_components(); ++i) {

@@ -1,6 +1,7 @@
 // The process graph, checked before anything starts.
 #pragma once
 
+#include <atomic>
 #include <map>
 #include <memory>
 #include <string>
@@ -88,8 +89,10 @@ ConfiguredComponent ConfigureComponent(const RunSpec& spec, int index,
 /// All components of a run, made, configured and checked.
 class BoundGraph {
  public:
-  /// Throws GraphError or ConfigError.
-  BoundGraph(const RunSpec& spec, const ComponentRegistry& registry);
+  /// `configuring`, where given, has the index of the component whose Configure runs, -1 between
+  /// them. Throws GraphError or ConfigError.
+  BoundGraph(const RunSpec& spec, const ComponentRegistry& registry,
+             std::atomic<int>* configuring = nullptr);
 
   const GraphPlan& plan() const { return plan_; }
   int num_components() const { return static_cast<int>(components_.size()); }

@@ -166,6 +166,9 @@ export function programFacts(poise) {
     for (const [, name] of section?.[1].matchAll(/^ {2}([a-z][\w-]*)/gm) ?? []) visit([...words, name]);
   };
   visit([]);
-  const fields = new Set([...ask('list', 'fields').matchAll(/^([a-z][\w.[\]]*):/gm)].map((m) => m[1]));
+  const fields = new Set();  // with the groups that they are in
+  for (const [, path] of ask('list', 'fields', '--markdown').matchAll(/^\| `([a-z][\w.[\]]*)` \|/gm)) {
+    for (let end = path.length; end > 0; end = path.lastIndexOf('.', end - 1)) fields.add(path.slice(0, end));
+  }
   return {commands, fields, messages: ask('list', 'messages', '--markdown')};
 }

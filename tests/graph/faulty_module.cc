@@ -1,5 +1,5 @@
 // A module whose component fails on purpose. POISE_TEST_FAULT says how and when:
-//   hang:TICK    its stage loops for ever
+//   hang:TICK    its stage loops for ever, at -1 its Configure
 //   crash:TICK   SIGSEGV
 //   throw:TICK   an exception
 //   exit:TICK    exit(0)
@@ -32,6 +32,7 @@ class Faulty : public poise::Component {
     const auto model = poise::LoadRobot(context);
     const char* const fault = std::getenv("POISE_TEST_FAULT");
     if (fault != nullptr) std::sscanf(fault, "%7[a-z]:%lf", kind_, &at_);
+    if (std::string_view(kind_) == "hang" && at_ < 0) Hang();
     wiring->AddInput(&robot_state_, "robot_state", poise::JointAndFootCounts(*model));
     wiring->AddOutput(&watched_, "watched", {});
     wiring->AddStage("watch", {&robot_state_}, {&watched_},
@@ -56,6 +57,10 @@ class Faulty : public poise::Component {
       return;
     }
     if (kind != "hang") std::raise(SIGSEGV);
+    Hang();
+  }
+
+  static void Hang() {
     for (std::atomic<bool> go{true}; go.load();) continue;
   }
 

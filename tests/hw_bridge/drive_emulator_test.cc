@@ -92,8 +92,11 @@ class Pair {
     for (size_t at = 0; (at = drives.find("wiring", at)) != std::string::npos;) {
       drives.replace(at, 6, "drive");
     }
+    // Before the first tick a watchdog counts wall time, of which a busy machine takes what it
+    // likes.
     bridge.Configure(
-        fmt::format("ethercat {{ {} simulated_time: true master {{ drift_frames: 100 profile {{ {} "
+        fmt::format("ethercat {{ {} simulated_time: true master {{ drift_frames: 100 watchdog: "
+                    "5000 profile {{ {} "
                     "}} {} }} }} {}",
                     link, ReadDeployed("drives/elmo_gold.pbtxt"), drives, bridge_config));
     emulator.Configure(fmt::format("{} simulated_time: true {} {}", link, emulator_config, wiring));

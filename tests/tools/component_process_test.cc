@@ -20,7 +20,7 @@
 #include "poise/robot_state_t.hpp"
 #include "tests/framework/toy_components.h"
 #include "tests/logging/log_test_support.h"
-#include "tools/run/stall_watch.h"
+#include "tools/cli/stall_watch.h"
 
 namespace poise {
 namespace {

@@ -221,6 +221,10 @@ TEST(FieldRules, TheReferenceTellsThem) {
   ASSERT_EQ(fields.size(), 1);
   EXPECT_EQ(fields[0].range, "0 to 1");
   EXPECT_THAT(FieldsAsText(fields, 80), HasSubstr("number, 0 to 1, default 0.02"));
+  const FieldEntry name{.path = "a", .meaning = "text"};
+  const FieldEntry group{.path = "b[i]", .meaning = "First. Second.", .group = true};
+  EXPECT_EQ(FieldIndex({name, group, {.path = "b[i].c"}, {.path = "b[i].d"}}, 80),
+            "a                           text\nb                           2 fields. First.\n");
   // The two parents of a group fill it differently.
   for (const auto& [path, value] : {std::pair("step_planner.walk.motion.unload", "Default: 0.8."),
                                     {"step_planner.recovery.motion.unload", "Default: 0.04."}}) {

@@ -88,7 +88,14 @@ int ListFields(const ListRequest& request) {
                                                          {"sweep", Schema::kSweep},
                                                          {"graph", Schema::kGraph}};
   const auto fields = SelectFields(FieldReference(kSchemas.at(request.schema)), request.name);
-  fmt::print("{}", request.markdown ? FieldsAsMarkdown(fields) : FieldsAsText(fields, TextWidth()));
+  if (request.markdown) {
+    fmt::print("{}", FieldsAsMarkdown(fields));
+  } else if (request.name.empty()) {
+    fmt::print("{}\n`poise list fields NAME` tells of those of a name, or with a part of one.\n",
+               FieldIndex(fields, TextWidth()));
+  } else {
+    fmt::print("{}", FieldsAsText(fields, TextWidth()));
+  }
   return kExitOk;
 }
 
@@ -330,7 +337,8 @@ int List(const ListRequest& request) {
   }
   if (what.empty()) {
     fmt::print(
-        "\npoise list fields: every field of a scenario with type, default, unit and meaning\n"
+        "\npoise list fields [NAME]: the fields of a scenario with type, default, unit and "
+        "meaning\n"
         "poise list messages: every message of the bus\n");
   }
   return kExitOk;

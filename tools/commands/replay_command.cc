@@ -22,7 +22,7 @@
 #include "tools/commands/commands.h"
 #include "tools/report/html_report.h"
 #include "tools/report/run_screen.h"
-#include "tools/run/inline_run.h"
+#include "tools/run/stage_watch.h"
 #include "tools/run/run_dir.h"
 #include "tools/run/scenario_run.h"
 #include "tools/scenario/described_components.h"

@@ -22,7 +22,7 @@
 #include "tools/live/view_server.h"
 #include "tools/operator/inline_port.h"
 #include "tools/report/html_report.h"
-#include "tools/run/inline_run.h"
+#include "tools/run/stage_watch.h"
 #include "tools/scenario/registry.h"
 
 namespace poise {

@@ -82,6 +82,31 @@ std::string FieldsAsText(const std::vector<FieldEntry>& fields, size_t width) {
   return text;
 }
 
+std::string FieldIndex(const std::vector<FieldEntry>& fields, size_t width) {
+  constexpr size_t kColumn = 28;
+  std::string text;
+  for (size_t i = 0; i < fields.size();) {
+    const FieldEntry& first = fields[i];
+    const std::string name = first.path.substr(0, first.path.find_first_of(".["));
+    size_t count = 0;
+    size_t end = i;
+    for (; end < fields.size(); ++end) {
+      const std::string& path = fields[end].path;
+      if (path.substr(0, path.find_first_of(".[")) != name) break;
+      count += fields[end].group ? 0 : 1;
+    }
+    const bool alone = end == i + 1 && !first.group;
+    const std::string meaning = first.meaning.substr(0, first.meaning.find(". ") + 1);
+    const std::string line =
+        Wrapped(fmt::format("{}{}", alone ? "" : fmt::format("{} fields. ", count),
+                            meaning.empty() ? first.meaning : meaning),
+                width, kColumn);
+    text += fmt::format("{:<{}}{}", name, kColumn, line.substr(kColumn));
+    i = end;
+  }
+  return text;
+}
+
 std::string FieldsAsMarkdown(const std::vector<FieldEntry>& fields) {
   std::string text;
   const std::string heading =

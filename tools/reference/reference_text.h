@@ -17,6 +17,8 @@ std::string Wrapped(std::string_view text, size_t width, size_t indent);
 
 /// Two or more lines a field: path, type, default and unit; below it the meaning.
 std::string FieldsAsText(const std::vector<FieldEntry>& fields, size_t width);
+/// A line for each name on the first level: how many fields it has, and what they are for.
+std::string FieldIndex(const std::vector<FieldEntry>& fields, size_t width);
 /// A section for each group, a row a field.
 std::string FieldsAsMarkdown(const std::vector<FieldEntry>& fields);
 

@@ -22,7 +22,7 @@
 #include "fmt/format.h"
 #include "logging/recording/inline_recorder.h"
 #include "tools/cli/signals.h"
-#include "tools/run/stall_watch.h"
+#include "tools/run/stage_watch.h"
 #include "tools/scenario/registry.h"
 
 namespace poise {
@@ -48,53 +48,6 @@ void TellAllocations(const InlineRunner& runner) {
 }
 
 }  // namespace
-
-StageWatch::StageWatch(const RunSpec& spec, std::vector<InlineRunner::StageName> stages,
-                       std::function<std::string()> last_words)
-    : spec_(spec), stages_(std::move(stages)), last_words_(std::move(last_words)) {
-  thread_ = std::thread([this] { Run(); });
-}
-
-StageWatch::~StageWatch() {
-  {
-    const std::lock_guard lock(mutex_);
-    over_ = true;
-  }
-  changed_.notify_all();
-  thread_.join();
-}
-
-void StageWatch::Run() {
-  constexpr std::chrono::milliseconds kLook{200};
-  StallWatch watch;
-  std::unique_lock lock(mutex_);
-  while (!changed_.wait_for(lock, kLook, [this] { return over_; })) {
-    const int32_t stage = position_.stage.load(std::memory_order_relaxed);
-    const int64_t tick = position_.tick.load(std::memory_order_relaxed);
-    const auto stages = static_cast<int64_t>(stages_.size());
-    const int64_t stood = watch.Stood(tick * (stages + 1) + stage, NowNanoseconds());
-    // Between the stages the run writes its log: to wait for the disk there is no stall.
-    if (stage != RunPosition::kNoStage && stood > kStallPatience) End(tick, stage);
-  }
-}
-
-void StageWatch::End(int64_t tick, int32_t stage) {
-  std::string rest;
-  try {
-    rest = last_words_();
-  } catch (const std::exception& error) {
-    rest = error.what();
-  }
-  const InlineRunner::StageName& name = stages_[static_cast<size_t>(stage)];
-  fmt::print(stderr,
-             "poise: {} hangs: its stage {} has not returned for {} s, at tick {} "
-             "({:.3f} s){}{}\n",
-             name.component, name.stage, kStallPatience / 1'000'000'000, tick,
-             MakeTick(tick, spec_.tick_period(), spec_.lead_ticks()).time, rest.empty() ? "" : "; ",
-             rest);
-  std::fflush(nullptr);
-  _exit(1);
-}
 
 void CountAllocations() {
   if (AllocationCounter() != nullptr) return;

@@ -16,7 +16,7 @@
 #include "tools/run/component_process.h"
 #include "tools/run/crane_watch.h"
 #include "tools/run/kill_schedule.h"
-#include "tools/run/stall_watch.h"
+#include "tools/cli/stall_watch.h"
 
 namespace poise {
 

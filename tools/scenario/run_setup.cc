@@ -25,6 +25,7 @@
 #include "components/step_planner/walk_config.h"
 #include "fmt/format.h"
 #include "tools/scenario/catalog.h"
+#include "tools/scenario/configure_watch.h"
 #include "tools/scenario/described_components.h"
 #include "tools/scenario/graph_files.h"
 #include "tools/scenario/library_versions.h"
@@ -386,7 +387,8 @@ void CheckRun(const LoadedScenario& loaded, RunSpec* spec) {
   CheckSharedProcesses(spec->graph());
   try {
     CheckGraph(spec->graph(), Components());
-    const BoundGraph bound(*spec, Components());
+    ConfigureWatch watch(*spec);
+    const BoundGraph bound(*spec, Components(), watch.configuring());
     FillPlan(bound.plan(), spec->mutable_graph());
   } catch (const GraphError& error) {
     FailGraph(loaded.graph_file, error);

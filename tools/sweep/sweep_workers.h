@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "components/framework/runners/run_position.h"
-#include "tools/run/stall_watch.h"
+#include "tools/cli/stall_watch.h"
 
 namespace poise {
 

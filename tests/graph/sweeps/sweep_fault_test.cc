@@ -191,6 +191,22 @@ TEST_F(SweepFaultTest, AnInlineRunThatHangsEndsAndNamesTheStage) {
   EXPECT_GT(fs::file_size(Out("run") + "/run.lcm"), 100'000u);  // what came before
 }
 
+TEST_F(SweepFaultTest, AnInlineRunThatAStageEndsFailsAndNamesTheStage) {
+  setenv("POISE_TEST_FAULT", "exit:100", 1);
+  const ProgramResult result = RunPoise({"run", "faulty", "--inline", "--out", Out("run")});
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  EXPECT_THAT(result.output,
+              HasSubstr("faulty ends the run: its stage watch called exit(0), at tick 100"));
+  EXPECT_GT(fs::file_size(Out("run") + "/run.lcm"), 100'000u);  // what came before
+}
+
+TEST_F(SweepFaultTest, AConfigureThatHangsIsNamed) {
+  setenv("POISE_TEST_FAULT", "hang:-1", 1);
+  const ProgramResult result = RunPoise({"sweep", "faulty", "--vary", "duration=0.1,0.3"});
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("faulty hangs: its Configure has not returned for 30 s"));
+}
+
 TEST_F(SweepFaultTest, AnInteractiveRunThatHangsEndsAndNamesTheStage) {
   setenv("POISE_TEST_FAULT", "hang:100", 1);
   const ProgramResult result = RunPoise({"run", "faulty", "--interactive", "--out", Out("run")});

@@ -2,7 +2,11 @@
 #pragma once
 
 #include <algorithm>
+#include <condition_variable>
 #include <cstdint>
+#include <functional>
+#include <mutex>
+#include <thread>
 
 #include "tools/cli/child_process.h"
 
@@ -34,6 +38,24 @@ class StallWatch {
   int64_t progress_ = 0;
   int64_t last_look_ = 0;  // ns; 0: none yet
   int64_t stood_ = 0;      // ns
+};
+
+/// Asks a StallWatch in a thread of its own, for what blocks this one.
+class StallThread {
+ public:
+  /// `progress`: any number that changes while it goes on; negative: what may last. `stalled`: is
+  /// called with it, in that thread, once it has not changed for `patience`, ns.
+  StallThread(int64_t patience, std::function<int64_t()> progress,
+              std::function<void(int64_t)> stalled);
+  ~StallThread();
+  StallThread(const StallThread&) = delete;
+  StallThread& operator=(const StallThread&) = delete;
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool over_ = false;
+  std::thread thread_;
 };
 
 /// Measures for how long a process has said nothing though it could have. It is asked again and
