@@ -227,7 +227,7 @@ TEST(FieldRules, TheReferenceTellsThem) {
             "a                           text\nb                           2 fields. First.\n");
   // The two parents of a group fill it differently.
   for (const auto& [path, value] : {std::pair("step_planner.walk.motion.unload", "Default: 0.8."),
-                                    {"step_planner.recovery.motion.unload", "Default: 0.04."}}) {
+                                    {"step_planner.recovery.motion.unload", "Default: 0.02."}}) {
     EXPECT_THAT(SelectFields(FieldReference(Schema::kScenario), path).at(0).meaning,
                 HasSubstr(value));
   }

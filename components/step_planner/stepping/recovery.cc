@@ -13,7 +13,7 @@ using Eigen::Vector3d;
 
 // m beyond the soles from which on neither ankles nor hips are trusted to bring the capture point
 // back. Fitted to what stands from both feet (docs/reference/steps.md).
-constexpr double kHopelessExcess = 0.015;
+constexpr double kHopelessExcess = 0.005;
 constexpr double kAgainAfter = 0.03;   // s beyond the soles of a step: longer than its touch
 constexpr double kNearEdgeTime = 0.1;  // s near the soles' edge: a push that stands is out sooner
 constexpr int kMostSteps = 12;         // in a row: an end to steps that catch nothing
@@ -36,6 +36,9 @@ constexpr double kStillDistance = 0.03, kStillSpeed = 0.06, kStillTime = 0.3;
 constexpr double kStillBesideTime = 1;
 // Share of a swing before which a load is the ground that the foot leaves, or a tap on the way up.
 constexpr double kLeastProgress = 0.5;
+// m above the ground of a sole's lowest corner, from which on an observed load is no landing before
+// it is time: a leg that brakes its swing is observed as a load.
+constexpr double kLowSole = 0.015;
 // Feet are put side by side without haste, as no fall is to be caught.
 constexpr double kTogetherShift = 1.5;  // s in which the COM goes above the foot that stays
 constexpr double kMostShifts = 2.5;     // times that, after which it is given up
@@ -279,8 +282,20 @@ double Recovery::TouchLoad(const StepInput& input) const {
 }
 
 bool Recovery::Touches(const StepInput& input) const {
+  if (swing_.Progress(input.time) < kLeastProgress) return false;
   // The first load counts: the foot bounces, and six milliseconds of steady load came 0.12 s late.
-  return swing_.Progress(input.time) >= kLeastProgress && input.load[plan_.foot] > TouchLoad(input);
+  if (!(input.load[plan_.foot] > TouchLoad(input))) return false;
+  return !(input.least_load[plan_.foot] > 0) || input.time >= touch_down_ || IsLow(input);
+}
+
+bool Recovery::IsLow(const StepInput& input) const {
+  const Eigen::Isometry3d& sole = input.sole[plan_.foot];
+  const balance::ConvexPolygon outline = SoleAt(choice_.foot(plan_.foot), 0, Vector2d::Zero(), 0);
+  double lowest = 0;
+  for (const Vector2d& corner : outline.corners()) {
+    lowest = std::min(lowest, sole.linear().row(2).head<2>().dot(corner));
+  }
+  return sole.translation().z() + lowest < swing_.foothold().z() + kLowSole;
 }
 
 void Recovery::Land(const StepInput& input) {
