@@ -45,7 +45,7 @@ constexpr int kStepRows = 7;
 constexpr double kHeldWeight = 10;
 // The roll and pitch of a foot in the air count more: they cost next to no energy, so that a hip at
 // its torque limit gave them up first, and G1's foot came down on its heel, tilted by 17 degrees
-// and 25 mm above the ground.
+// and 25 mm above the ground. G1 stands as many pushes with 100.
 constexpr double kLevelWeight = 1000;
 // Share of the weight that a sole keeps in a step, at least: alone, and with the other one.
 constexpr double kLeastAlone = 0.2, kLeastShared = 0.02;
@@ -106,7 +106,7 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
   step_balance_.emplace(num_joints, kStepRows);
   step_jacobian_ = Eigen::MatrixXd::Zero(kStepRows, model_->num_velocities());
   step_weight_ = Eigen::VectorXd::Constant(kStepRows, kHeldWeight);
-  step_weight_.segment<2>(4).setConstant(kLevelWeight);
+  step_weight_.segment<2>(4).setConstant(kLevelWeight);  // after height, x, y and z
   effort_ = Eigen::VectorXd::Zero(num_joints);
   for (int j = 0; j < num_joints; ++j) {
     effort_[j] = model_->joints()[static_cast<size_t>(j)].effort;

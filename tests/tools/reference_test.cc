@@ -225,6 +225,8 @@ TEST(FieldRules, TheReferenceTellsThem) {
   const FieldEntry group{.path = "b[i]", .meaning = "First. Second.", .group = true};
   EXPECT_EQ(FieldIndex({name, group, {.path = "b[i].c"}, {.path = "b[i].d"}}, 80),
             "a                           text\nb                           2 fields. First.\n");
+  EXPECT_EQ(FieldIndex({{.path = "a", .meaning = "e.g. 7.2. Not more."}, {.path = "b"}}, 80),
+            "a                           e.g. 7.2.\nb                           \n");
   // The two parents of a group fill it differently.
   for (const auto& [path, value] : {std::pair("step_planner.walk.motion.unload", "Default: 0.8."),
                                     {"step_planner.recovery.motion.unload", "Default: 0.02."}}) {

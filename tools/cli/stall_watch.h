@@ -16,6 +16,9 @@ namespace poise {
 /// is busy with much else does not come near.
 inline constexpr int64_t kStallPatience = 20'000'000'000;
 
+/// Wall time in which a process is ready, and each component configured, ns.
+inline constexpr int64_t kReadyPatience = 30'000'000'000;
+
 /// The most that counts between two questions of those who watch, ns.
 inline constexpr int64_t kLongestLook = 500'000'000;
 

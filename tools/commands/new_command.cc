@@ -53,7 +53,7 @@ int NewScenario(const NewOptions& options) {
   const LoadedScenario loaded = LoadScenario(file.string(), {});
   fmt::print(
       "{}: {}\n  to run it:    poise run {}\n  to check it:  poise graph check {}\n"
-      "  every field:  poise list fields\n",
+      "  the fields:   poise list fields [NAME]\n",
       file.filename().string(), loaded.scenario.description(), file.filename().string(),
       file.filename().string());
   return kExitOk;

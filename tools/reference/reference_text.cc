@@ -1,6 +1,7 @@
 #include "tools/reference/reference_text.h"
 
 #include <algorithm>
+#include <cctype>
 
 #include "fmt/format.h"
 
@@ -31,6 +32,16 @@ std::string ChannelsOf(const MessageEntry& message, const ChannelsByType& channe
 /// Whether a comment says itself what holds without a value: "Default: that of the robot".
 bool TellsDefault(std::string_view meaning) {
   return meaning.find("efault:") != std::string_view::npos;
+}
+
+/// Up to the first full stop before a capital: "e.g. 7.2" goes on.
+std::string FirstSentence(const std::string& text) {
+  for (size_t at = 0; (at = text.find(". ", at)) != std::string::npos; ++at) {
+    if (at + 2 < text.size() && std::isupper(static_cast<unsigned char>(text[at + 2])) != 0) {
+      return text.substr(0, at + 1);
+    }
+  }
+  return text;
 }
 
 /// A cell of a Markdown table.
@@ -84,24 +95,23 @@ std::string FieldsAsText(const std::vector<FieldEntry>& fields, size_t width) {
 
 std::string FieldIndex(const std::vector<FieldEntry>& fields, size_t width) {
   constexpr size_t kColumn = 28;
+  const auto first_name = [](const FieldEntry& field) {
+    return field.path.substr(0, field.path.find_first_of(".["));
+  };
   std::string text;
   for (size_t i = 0; i < fields.size();) {
     const FieldEntry& first = fields[i];
-    const std::string name = first.path.substr(0, first.path.find_first_of(".["));
-    size_t count = 0;
-    size_t end = i;
-    for (; end < fields.size(); ++end) {
-      const std::string& path = fields[end].path;
-      if (path.substr(0, path.find_first_of(".[")) != name) break;
+    const std::string name = first_name(first);
+    size_t count = 0, end = i;
+    for (; end < fields.size() && first_name(fields[end]) == name; ++end) {
       count += fields[end].group ? 0 : 1;
     }
     const bool alone = end == i + 1 && !first.group;
-    const std::string meaning = first.meaning.substr(0, first.meaning.find(". ") + 1);
     const std::string line =
-        Wrapped(fmt::format("{}{}", alone ? "" : fmt::format("{} fields. ", count),
-                            meaning.empty() ? first.meaning : meaning),
+        Wrapped((alone ? "" : fmt::format("{} fields. ", count)) + FirstSentence(first.meaning),
                 width, kColumn);
-    text += fmt::format("{:<{}}{}", name, kColumn, line.substr(kColumn));
+    // A field without a comment has no line.
+    text += fmt::format("{:<{}}{}", name, kColumn, line.empty() ? "\n" : line.substr(kColumn));
     i = end;
   }
   return text;

@@ -16,8 +16,7 @@
 namespace poise {
 namespace {
 
-constexpr int64_t kSecond = 1'000'000'000;       // ns
-constexpr int64_t kReadyTimeout = 30 * kSecond;  // and what the machine let it wait
+constexpr int64_t kSecond = 1'000'000'000;  // ns
 constexpr int64_t kStartTimeout = 30 * kSecond;
 constexpr int64_t kRecordTimeout = 30 * kSecond;
 constexpr int64_t kStopPatience = 2 * kSecond;  // before SIGTERM, and again before SIGKILL
@@ -184,7 +183,8 @@ bool Launcher::WaitUntilReady() {
     for (const auto& process : processes_) {
       kept = std::max(kept, process->process().processor_time().waited);
     }
-    if (NowNanoseconds() > start + kReadyTimeout + kept) {
+    // What the machine let it wait does not count.
+    if (NowNanoseconds() > start + kReadyPatience + kept) {
       std::string names;
       std::vector<std::string> details;
       for (const auto& process : processes_) {

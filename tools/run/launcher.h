@@ -11,12 +11,12 @@
 #include "components/framework/graph.pb.h"
 #include "tools/cli/child_process.h"
 #include "tools/cli/progress.h"
+#include "tools/cli/stall_watch.h"
 #include "tools/report/machine_load.h"
 #include "tools/report/run_outcome.h"
 #include "tools/run/component_process.h"
 #include "tools/run/crane_watch.h"
 #include "tools/run/kill_schedule.h"
-#include "tools/cli/stall_watch.h"
 
 namespace poise {
 

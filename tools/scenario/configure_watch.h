@@ -9,7 +9,7 @@
 namespace poise {
 
 /// Watches, while it lives, a BoundGraph that is being made. Where one Configure has not returned
-/// for 30 s, as long as a process of its own has, it says whose that is and ends the program.
+/// for kReadyPatience, it says whose that is and ends the program.
 class ConfigureWatch {
  public:
   /// `spec` outlives the watch.

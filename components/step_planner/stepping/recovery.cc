@@ -12,7 +12,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 // m beyond the soles from which on neither ankles nor hips are trusted to bring the capture point
-// back. Fitted to what stands from both feet (docs/reference/steps.md).
+// back. Fitted to G1's pushes; as many steps as with 15 mm are needless (docs/lab/steps).
 constexpr double kHopelessExcess = 0.005;
 constexpr double kAgainAfter = 0.03;   // s beyond the soles of a step: longer than its touch
 constexpr double kNearEdgeTime = 0.1;  // s near the soles' edge: a push that stands is out sooner

@@ -85,7 +85,7 @@ class Recovery {
   void Swings(const StepInput& input, const StepState& state);
   /// The foot that swings has met the ground, and is a contact of the model from now on.
   bool Touches(const StepInput& input) const;
-  /// A corner of its sole is near the ground.
+  /// A corner of the swinging sole is near the ground.
   bool IsLow(const StepInput& input) const;
   /// N on it that are a touch.
   double TouchLoad(const StepInput& input) const;

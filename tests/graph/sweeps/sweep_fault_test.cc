@@ -38,6 +38,17 @@ class SweepFaultTest : public testing::Test {
   static std::string Read(const std::string& folder, const char* file) {
     return ReadAll(fs::path(folder) / file);
   }
+  /// A run in one process ends by `fault` with exit code 1, `words` and the log of what came
+  /// before.
+  void ExpectEnds(const std::string& way, const char* fault, const std::string& words) const {
+    SCOPED_TRACE(way);
+    setenv("POISE_TEST_FAULT", fault, 1);
+    const std::string out = Out("run" + way);
+    const ProgramResult result = RunPoise({"run", "faulty", way, "--out", out});
+    EXPECT_EQ(result.exit_code, 1) << result.output;
+    EXPECT_THAT(result.output, HasSubstr("faulty " + words));
+    EXPECT_GT(fs::file_size(out + "/run.lcm"), 100'000u);
+  }
 
   TestDeploy deploy_;
 };
@@ -182,22 +193,16 @@ TEST_F(SweepFaultTest, AStageThatLoopsForEverIsNamedAndTheOthersGoOn) {
   EXPECT_EQ(std::stod(rows[1].at("ended_at")), 0.2);
 }
 
-TEST_F(SweepFaultTest, AnInlineRunThatHangsEndsAndNamesTheStage) {
-  setenv("POISE_TEST_FAULT", "hang:100", 1);
-  const ProgramResult result = RunPoise({"run", "faulty", "--inline", "--out", Out("run")});
-  EXPECT_EQ(result.exit_code, 1) << result.output;
-  EXPECT_THAT(result.output,
-              HasSubstr("faulty hangs: its stage watch has not returned for 20 s, at tick 100"));
-  EXPECT_GT(fs::file_size(Out("run") + "/run.lcm"), 100'000u);  // what came before
+TEST_F(SweepFaultTest, ARunInOneProcessThatHangsEndsAndNamesTheStage) {
+  for (const char* way : {"--inline", "--interactive"}) {
+    ExpectEnds(way, "hang:100", "hangs: its stage watch has not returned for 20 s, at tick 100");
+  }
 }
 
-TEST_F(SweepFaultTest, AnInlineRunThatAStageEndsFailsAndNamesTheStage) {
-  setenv("POISE_TEST_FAULT", "exit:100", 1);
-  const ProgramResult result = RunPoise({"run", "faulty", "--inline", "--out", Out("run")});
-  EXPECT_EQ(result.exit_code, 1) << result.output;
-  EXPECT_THAT(result.output,
-              HasSubstr("faulty ends the run: its stage watch called exit(0), at tick 100"));
-  EXPECT_GT(fs::file_size(Out("run") + "/run.lcm"), 100'000u);  // what came before
+TEST_F(SweepFaultTest, ARunInOneProcessThatAStageEndsFailsAndNamesTheStage) {
+  for (const char* way : {"--inline", "--interactive"}) {
+    ExpectEnds(way, "exit:100", "ends the run: its stage watch called exit(0), at tick 100");
+  }
 }
 
 TEST_F(SweepFaultTest, AConfigureThatHangsIsNamed) {
@@ -205,15 +210,6 @@ TEST_F(SweepFaultTest, AConfigureThatHangsIsNamed) {
   const ProgramResult result = RunPoise({"sweep", "faulty", "--vary", "duration=0.1,0.3"});
   EXPECT_EQ(result.exit_code, 1) << result.output;
   EXPECT_THAT(result.output, HasSubstr("faulty hangs: its Configure has not returned for 30 s"));
-}
-
-TEST_F(SweepFaultTest, AnInteractiveRunThatHangsEndsAndNamesTheStage) {
-  setenv("POISE_TEST_FAULT", "hang:100", 1);
-  const ProgramResult result = RunPoise({"run", "faulty", "--interactive", "--out", Out("run")});
-  EXPECT_EQ(result.exit_code, 1) << result.output;
-  EXPECT_THAT(result.output,
-              HasSubstr("faulty hangs: its stage watch has not returned for 20 s, at tick 100"));
-  EXPECT_GT(fs::file_size(Out("run") + "/run.lcm"), 100'000u);
 }
 
 TEST_F(SweepFaultTest, AReplayThatHangsEndsAndNamesTheStage) {
