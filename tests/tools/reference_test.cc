@@ -221,11 +221,18 @@ TEST(FieldRules, TheReferenceTellsThem) {
   ASSERT_EQ(fields.size(), 1);
   EXPECT_EQ(fields[0].range, "0 to 1");
   EXPECT_THAT(FieldsAsText(fields, 80), HasSubstr("number, 0 to 1, default 0.02"));
-  const FieldEntry name{.path = "a", .meaning = "text"};
-  const FieldEntry group{.path = "b[i]", .meaning = "First. Second.", .group = true};
-  EXPECT_EQ(FieldIndex({name, group, {.path = "b[i].c"}, {.path = "b[i].d"}}, 80),
+  const auto entry = [](std::string path, std::string meaning, bool group = false) {
+    FieldEntry entry;
+    entry.path = std::move(path);
+    entry.meaning = std::move(meaning);
+    entry.group = group;
+    return entry;
+  };
+  EXPECT_EQ(FieldIndex({entry("a", "text"), entry("b[i]", "First. Second.", true),
+                        entry("b[i].c", ""), entry("b[i].d", "")},
+                       80),
             "a                           text\nb                           2 fields. First.\n");
-  EXPECT_EQ(FieldIndex({{.path = "a", .meaning = "e.g. 7.2. Not more."}, {.path = "b"}}, 80),
+  EXPECT_EQ(FieldIndex({entry("a", "e.g. 7.2. Not more."), entry("b", "")}, 80),
             "a                           e.g. 7.2.\nb                           \n");
   // The two parents of a group fill it differently.
   for (const auto& [path, value] : {std::pair("step_planner.walk.motion.unload", "Default: 0.8."),
