@@ -30,11 +30,11 @@ RobotThresholds DeriveThresholds(const robot::RobotModel& model) {
   RobotThresholds result;
   const double pendulum =
       Rounded(kPendulumShare * model.total_mass() * robot::kGravity * robot::StandingHeight(model));
+  const Eigen::VectorXd peak = robot::PeakTorques(model);
   double largest = 0, friction = 0;
   for (size_t j = 0; j < model.motors().size(); ++j) {
     const robot::MotorModel& motor = model.motors()[j];
-    const double limit =
-        std::min(model.joints()[j].effort, motor.torque_per_ampere() * motor.peak_current);
+    const double limit = peak[static_cast<Eigen::Index>(j)];
     largest = std::max(largest, limit);
     friction = std::max(friction, motor.static_friction);
     const double stiffness = std::min(pendulum, limit / kGiveTo);

@@ -1,5 +1,7 @@
 #include "components/balance/redistribution.h"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace poise::balance {
@@ -21,6 +23,16 @@ double RedistributionTorque(const MatrixRef& contact_jacobian, const VectorRef& 
     squared += force * force;
   }
   return std::sqrt(squared);
+}
+
+double ShareWithin(const VectorRef& limit, const VectorRef& torque, const VectorRef& change) {
+  double share = 1;
+  for (Eigen::Index i = 0; i < torque.size(); ++i) {
+    const double room = limit[i] - (change[i] < 0 ? -torque[i] : torque[i]);
+    if (room >= 0 && std::abs(change[i]) > room)
+      share = std::min(share, room / std::abs(change[i]));
+  }
+  return share;
 }
 
 }  // namespace poise::balance

@@ -14,4 +14,8 @@ namespace poise::balance {
 double RedistributionTorque(const MatrixRef& contact_jacobian, const VectorRef& wrench_change,
                             Eigen::Ref<Eigen::VectorXd> torque);
 
+/// The largest share, 0 to 1, of `change` that can be added to `torque` within ±`limit` (k×1 each,
+/// N·m). Joints that are beyond their limit already do not count.
+double ShareWithin(const VectorRef& limit, const VectorRef& torque, const VectorRef& change);
+
 }  // namespace poise::balance

@@ -107,10 +107,7 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
   step_jacobian_ = Eigen::MatrixXd::Zero(kStepRows, model_->num_velocities());
   step_weight_ = Eigen::VectorXd::Constant(kStepRows, kHeldWeight);
   step_weight_.segment<2>(4).setConstant(kLevelWeight);  // after height, x, y and z
-  effort_ = Eigen::VectorXd::Zero(num_joints);
-  for (int j = 0; j < num_joints; ++j) {
-    effort_[j] = model_->joints()[static_cast<size_t>(j)].effort;
-  }
+  peak_torque_ = robot::PeakTorques(*model_);
   balance_control_.emplace(num_joints, most_rows);
   state_ = robot::RobotState(num_joints);
   height_jacobian_ = Eigen::MatrixXd::Zero(1, model_->num_velocities());
@@ -341,7 +338,7 @@ bool ContactWrenchMonitor::MoveForStep(const balance::ContactGeometry& geometry,
   const Eigen::Index held = both ? 1 : kStepRows;
   balance::StepBalance::Result step;
   if (!step_balance_->Compute(whole_body_->contact(), bounds,
-                              {step_jacobian_.topRows(held), step_weight_.head(held)}, effort_,
+                              {step_jacobian_.topRows(held), step_weight_.head(held)}, peak_torque_,
                               all_joints_ ? balance::Movers::kAllJoints : balance::Movers::kLegs,
                               torque_, &step)) {
     return false;

@@ -91,7 +91,7 @@ class ContactWrenchMonitor : public Component, public Operated {
   balance::StepBounds step_bounds_;
   Eigen::MatrixXd step_jacobian_;  // of what a step holds
   Eigen::VectorXd step_weight_;
-  Eigen::VectorXd effort_;  // N·m, by joint
+  Eigen::VectorXd peak_torque_;  // N·m, by joint
   balance::ContactLimits double_support_, single_support_;
   std::optional<double> beyond_soles_;  // m
   bool polygon_ = false;                // the region is the soles' hull

@@ -30,9 +30,17 @@ constexpr double kMostLightShare = 0.45;
 constexpr double kRatioRamp = 0.5;
 // 1/s: half of what shakes a foot on something soft (redistributor.proto).
 constexpr double kMostIntegral = 40;
+// Share of a joint's torque that stays free, so that no motor cuts what rounding adds.
+constexpr double kTorqueRounding = 1e-6;
 
 bool AllFinite(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
+}
+
+/// η of wrenches in the sole frames: the right foot's share of the resultant's F_z.
+double RightShare(const FootArray<Vector6d>& wrench, const FootArray<Eigen::Isometry3d>& sole_in_o,
+                  const Vector6d& resultant) {
+  return (sole_in_o[Foot::kRight].linear() * wrench[Foot::kRight].head<3>()).z() / resultant[2];
 }
 
 }  // namespace
@@ -66,6 +74,7 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   state_ = robot::RobotState(model_->num_joints());
   contact_jacobian_ = Eigen::MatrixXd::Zero(12, model_->num_velocities());
   torque_ = Eigen::VectorXd::Zero(model_->num_joints());
+  peak_torque_ = (1 - kTorqueRounding) * robot::PeakTorques(*model_);
   acceleration_ = Eigen::VectorXd::Zero(model_->num_velocities());
 
   AddSettings(context.tick_period);
@@ -201,6 +210,14 @@ int8_t Redistributor::ComputeDouble(const Tick& tick) {
     change << desired[Foot::kRight] - wrench[Foot::kRight],
         desired[Foot::kLeft] - wrench[Foot::kLeft];
     balance::RedistributionTorque(contact_jacobian_, change, torque_);
+    const Eigen::Map<const Eigen::VectorXd> balance_torque(balance_torque_->torque.data(),
+                                                           torque_.size());
+    const double share = balance::ShareWithin(peak_torque_, balance_torque, torque_);
+    if (share < 1) {
+      torque_ *= share;
+      for (const Foot f : kFeet) desired[f] = wrench[f] + share * (desired[f] - wrench[f]);
+      out.eta = RightShare(desired, sole_in_o, resultant);
+    }
     for (size_t i = 0; i < out.torque.size(); ++i) {
       out.redistribution_torque[i] = torque_[static_cast<Eigen::Index>(i)];
       out.torque[i] = balance_torque_->torque[i] + out.redistribution_torque[i];
@@ -210,8 +227,7 @@ int8_t Redistributor::ComputeDouble(const Tick& tick) {
   } else {
     PassTorqueThrough();
     ForgetDistribution();
-    const double right = (sole_in_o[Foot::kRight].linear() * wrench[Foot::kRight].head<3>()).z();
-    out.eta = pressed ? right / resultant[2] : 0.5;
+    out.eta = pressed ? RightShare(wrench, sole_in_o, resultant) : 0.5;
   }
   Report(wrench, double_support_, kBoth);
   return out.eta_feasible != 0 ? joint_command_t::STATUS_OK : joint_command_t::STATUS_INFEASIBLE;

@@ -98,6 +98,7 @@ class Redistributor : public Component, public Operated {
   bool state_valid_ = false;
   Eigen::MatrixXd contact_jacobian_;  // 12×n
   Eigen::VectorXd torque_;            // k×1
+  Eigen::VectorXd peak_torque_;       // k×1, N·m
   Eigen::VectorXd acceleration_;      // n×1
 };
 

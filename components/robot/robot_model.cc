@@ -82,4 +82,14 @@ RobotModel RobotModel::WithImuTurned(const Eigen::Matrix3d& turn) const {
   return RobotModel(std::move(parts));
 }
 
+Eigen::VectorXd PeakTorques(const RobotModel& model) {
+  Eigen::VectorXd torque(model.num_joints());
+  for (int j = 0; j < model.num_joints(); ++j) {
+    const MotorModel& motor = model.motors()[static_cast<size_t>(j)];
+    torque[j] = std::min(model.joints()[static_cast<size_t>(j)].effort,
+                         motor.torque_per_ampere() * motor.peak_current);
+  }
+  return torque;
+}
+
 }  // namespace poise::robot

@@ -209,4 +209,8 @@ class RobotModel {
   double total_mass_ = 0;
 };
 
+/// k×1, N·m that each joint gives at most: its effort, or what its motor's peak current gives where
+/// that is less.
+Eigen::VectorXd PeakTorques(const RobotModel& model);
+
 }  // namespace poise::robot

@@ -79,12 +79,10 @@ Eigen::VectorXd HoldingShares(const robot::RobotModel& model, robot::Foot foot, 
   const auto& jacobian = data.foot_jacobian[foot];
   const robot::Vector6d wrench =
       jacobian.leftCols<6>().transpose().partialPivLu().solve(data.gravity.head<6>());
+  const Eigen::VectorXd peak = robot::PeakTorques(model);
   for (const int j : model.supporting_joints(model.feet()[foot].body)) {
-    const auto joint = static_cast<size_t>(j);
-    const robot::MotorModel& motor = model.motors()[joint];
-    const double limit =
-        std::min(model.joints()[joint].effort, motor.torque_per_ampere() * motor.peak_current);
-    shares[j] = std::abs(data.gravity[6 + j] - jacobian.col(6 + j).dot(wrench)) / limit;
+    const double torque = data.gravity[6 + j] - jacobian.col(6 + j).dot(wrench);
+    shares[j] = std::abs(torque) / peak[j];
   }
   return shares;
 }

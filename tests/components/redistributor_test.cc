@@ -34,11 +34,13 @@ class ChainCase : public testing::TestWithParam<Case> {
   std::mt19937 random_{TestSeed(23)};
 };
 
-// The independent route of docs/reference/equations/redistribution.md: no matrix of section 3 is formed.
+// The independent route of docs/reference/equations/redistribution.md: no matrix of section 3 is
+// formed.
 class SquareRoute : public ChainCase {};
 
 TEST_P(SquareRoute, GivesTheSameTorqueAndWrenches) {
   double worst_torque = 0, worst_wrench = 0;
+  int compared = 0;
   for (int trial = 0; trial < 200; ++trial) {
     Chain chain(GetParam().robot, Phases(), MonitorConfig(false), RedistributorText());
     const robot::RobotModel& model = chain.model();
@@ -47,6 +49,11 @@ TEST_P(SquareRoute, GivesTheSameTorqueAndWrenches) {
     const robot::RobotState now = Disturbed(first, 0.02, 0.2, &random_);
     const joint_command_t& out = chain.Run(now, 1);
     ASSERT_NE(out.status, joint_command_t::STATUS_INVALID_INPUT);
+    // Where a motor can hold no more, less of the load is moved than (62)-(67) say.
+    const Eigen::ArrayXd used =
+        ToEigen(out.torque).array().abs() / robot::PeakTorques(model).array();
+    if (((used - (1 - 1e-6)).abs() < 1e-9).any()) continue;
+    ++compared;
 
     const Dynamics start(model, first, GetParam().in_contact);
     const Dynamics dynamics(model, now, GetParam().in_contact);
@@ -109,6 +116,7 @@ TEST_P(SquareRoute, GivesTheSameTorqueAndWrenches) {
         (force + dynamics.contact_jacobian.transpose() * wrench).tail(model.num_joints());
     worst_torque = std::max(worst_torque, (torque - ToEigen(out.torque)).norm());
   }
+  EXPECT_GT(compared, 80);        // of 200 random states
   EXPECT_LT(worst_torque, 1e-7);  // N·m, of some 100
   EXPECT_LT(worst_wrench, 1e-7);  // N, N·m, of some 500
   RecordProperty("worst_torque", testing::PrintToString(worst_torque));
@@ -298,6 +306,43 @@ TEST(Redistributor, TheRampTakesTheTorqueJumpOutOfTheSwitch) {
   EXPECT_LT(with.ramp_step, 1.5);  // N·m per tick: 0.2 s for some 30 N·m
   RecordProperty("jump_with", testing::PrintToString(with.largest_step));
   RecordProperty("jump_without", testing::PrintToString(without.largest_step));
+}
+
+// What balancing asks of a joint leaves half of what redistribution would add to it: half of the
+// load is moved, and the wrenches announced are the ones that this torque gives.
+TEST(Redistributor, MovesNoMoreLoadThanTheMotorsCanHold) {
+  Chain chain(TestRobot::kDyros, "phase { }", MonitorConfig(false), RedistributorText());
+  const robot::RobotState standing = StandingState(chain.model());
+  chain.Run(standing, 0);
+  ControlContext context(TestRobot::kDyros);
+  Harness<Redistributor> alone(&context, RedistributorText());
+  support_plan_t plan = chain.plan();
+  plan.transition = support_plan_t::TRANSITION_UNLOADING;
+  plan.transition_foot = 1;
+  plan.transition_progress = 0.9;
+  balance_torque_t balance = chain.balance();
+  alone.Bind("robot_state", &chain.state());
+  alone.Bind("support_plan", &plan);
+  alone.Bind("balance_torque", &balance);
+  alone.Run(TickAt(0));
+  const joint_command_t free = alone.output<joint_command_t>();
+  size_t most = 0;
+  for (size_t j = 0; j < free.torque.size(); ++j) {
+    if (std::abs(free.redistribution_torque[j]) > std::abs(free.redistribution_torque[most]))
+      most = j;
+  }
+  const double change = free.redistribution_torque[most];
+  ASSERT_GT(std::abs(change), 5);
+  const double limit = robot::PeakTorques(chain.model())[static_cast<Eigen::Index>(most)];
+  balance.torque[most] = std::copysign(limit, change) - 0.5 * change;
+  alone.Run(TickAt(1));
+  const auto& out = alone.output<joint_command_t>();
+  EXPECT_NEAR(std::abs(out.torque[most]), limit, 1e-5 * limit);
+  EXPECT_LT(std::abs(out.torque[most]), limit);
+  const double before = balance.foot_wrench[0].force[2];
+  EXPECT_NEAR(out.foot_wrench[0].force[2] - before, 0.5 * (free.foot_wrench[0].force[2] - before),
+              0.1);
+  EXPECT_NEAR(out.eta, out.foot_wrench[0].force[2] / balance.resultant.force[2], 1e-3);
 }
 
 // The COM further from the stance sole's centre than the sole's reduced half width: the ramp stops

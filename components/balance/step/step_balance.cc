@@ -24,10 +24,13 @@ constexpr double kInternal = 0.01, kLeastInternal = 1e-6;
 // Added to the dual problem's diagonal of 1: bounds that say the same have one solution.
 constexpr double kSoftness = 1e-9;
 constexpr double kTolerance = 1e-6;  // of a bound's own norm times that of the step
-constexpr double kHeldRow = 1e-9;    // squared norm of a row that the contacts hold already
+// Share of a torque limit that stays free: bounds are met to a rounding, and a motor that cut the
+// torque by it would give another wrench than the one computed.
+constexpr double kTorqueRounding = 1e-4;
+constexpr double kHeldRow = 1e-9;  // squared norm of a row that the contacts hold already
 
-/// The row a of a · F ≤ 0 that keeps the centre of pressure of F inside the edge from corner `i` on:
-/// out · (−M_y, M_x) ≥ out · corner F_z, as F_z < 0.
+/// The row a of a · F ≤ 0 that keeps the centre of pressure of F inside the edge from corner `i`
+/// on: out · (−M_y, M_x) ≥ out · corner F_z, as F_z < 0.
 Vector6d EdgeRow(std::span<const Eigen::Vector2d> corners, size_t i) {
   const Eigen::Vector2d along = (corners[(i + 1) % corners.size()] - corners[i]).normalized();
   const Eigen::Vector2d out(along.y(), -along.x());
@@ -173,7 +176,7 @@ void StepBalance::AddTorques(const VectorRef& effort, const VectorRef& torque) {
     for (const double side : {1.0, -1.0}) {
       bound_.col(bounds_).head(coordinates_) =
           side * torque_of_.row(j).head(coordinates_).transpose();
-      room_[bounds_++] = effort[j] - side * torque[j];
+      room_[bounds_++] = (1 - kTorqueRounding) * effort[j] - side * torque[j];
     }
   }
 }
