@@ -65,7 +65,9 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(
       "poise COMMAND --help says more. Exit code: 0 good, 1 a check or the run failed, 2 "
-      "wrong usage or configuration, 3 in real time, the machine was too late.\n"
+      "wrong usage or configuration, 3 in real time, nothing failed but that processes were lost "
+      "and "
+      "replaced or the machine was late.\n"
       "Start with: poise run, then poise report");
   poise::Command command;
   poise::AddRunCommand(&app, &command);

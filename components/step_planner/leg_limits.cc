@@ -165,7 +165,9 @@ void CheckStanceLegs(double distance, const robot::RobotModel& model, const step
       "walk.quasi_static",
       fmt::format("is true: the robot stands on one foot with its COM above the middle of that "
                   "sole. Robot '{}' comes within {:.3f} m of that, and {:.3f} m would do{}{}, and "
-                  "{} rad are kept off each limit. Give false",
+                  "{} rad are kept off each limit. Give false: it walks as on level ground then, "
+                  "and unknown "
+                  "ground is not for it",
                   model.name(), beside, distance, joints.empty() ? "" : ": ", joints, reserve));
 }
 

@@ -351,6 +351,12 @@ TEST(OddFiles, WhyALegLacksAJointIsTold) {
   EXPECT_THAT(RefusalOf(coupled),
               AllOf(HasSubstr("5 joints"), HasSubstr("joint 'left_ankle_roll_joint' mimics "
                                                      "'left_knee_joint'")));
+  // The joint that is followed is no finger's for that.
+  coupled = text;
+  coupled.insert(coupled.find("</joint>", coupled.find(at)),
+                 "<mimic joint='left_ankle_pitch_joint'/>");
+  EXPECT_THAT(RefusalOf(coupled),
+              AllOf(HasSubstr("'left_ankle_roll_joint' mimics"), Not(HasSubstr("moves a finger"))));
   std::string mjcf =
       robot::ReadWhole(std::filesystem::path(POISE_SOURCE_DIR) / "deploy/robots/heron/heron.xml");
   mjcf = std::regex_replace(mjcf, std::regex("<motor[^>]*joint=\"right_ankle_roll[^>]*/>"), "");

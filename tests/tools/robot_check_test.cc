@@ -230,6 +230,18 @@ TEST(RobotCheck, AMakersFileInPlaceOfARobotIsNamed) {
   }
 }
 
+// A scenario that does not say what it is and has its graph's name is not taken for the graph.
+TEST(RobotCheck, AFileOfAnotherKindsFolderIsNotMeant) {
+  const fs::path scenarios = fs::path(testing::TempDir()) / "poise_kinds" / "scenarios";
+  fs::create_directories(scenarios);
+  std::ofstream(scenarios / "balance.pbtxt") << "graph: \"balance\"\n";
+  const auto graph = LookForFile("graphs", "balance", scenarios);
+  ASSERT_TRUE(graph);
+  EXPECT_EQ(graph->parent_path().filename(), "graphs");
+  EXPECT_EQ(LookForFile("scenarios", "balance", scenarios), scenarios / "balance.pbtxt");
+  fs::remove_all(scenarios.parent_path());
+}
+
 TEST(RobotCheck, AGuessedSoleIsTold) {
   const RobotCheck check = Edited("length: 0.30", "length: 0.30 guessed: true");
   const nlohmann::ordered_json soles = RobotCheckJson(check)["soles"];

@@ -129,8 +129,8 @@ std::string ManPage(const CLI::App& app, const std::string& version) {
   }
   text +=
       ".SH EXIT STATUS\n0: good. 1: a check or the run failed. 2: wrong usage or configuration. 3, "
-      "in "
-      "real time: nothing failed but what the machine was too late for.\n"
+      "in real time: nothing failed but that processes were lost and replaced or the machine was "
+      "late.\n"
       ".SH ENVIRONMENT\n"
       ".TP\n.B POISE_PATH\nFolders with modules, programs, scenarios and robots of one's own, "
       "parted "

@@ -18,7 +18,8 @@ namespace {
 using logging::kMilli;
 using logging::PlannerStep;
 
-constexpr size_t kStepsTold = 2;  // steps that are told one by one
+constexpr double kToppling = 0.5;  // s in which a robot goes from its last support to the ground
+constexpr size_t kStepsTold = 2;   // steps that are told one by one
 
 std::optional<double> Figure(const logging::RunRecord& run, const char* metric) {
   return logging::FindMetric(metric)->compute(run);
@@ -57,9 +58,13 @@ std::string TellWalk(const logging::RunRecord& run, std::ptrdiff_t steps) {
   return text + ".";
 }
 
-/// Steps that no planner planned: of a controller that moves its feet by itself.
+/// Steps that no planner planned: of a controller that moves its feet by itself. A foot that comes
+/// off as the robot topples makes none.
 std::ptrdiff_t UnplannedSteps(const logging::RunRecord& run) {
+  const std::optional<int64_t> down = logging::DownTick(run);
   return std::ranges::count_if(logging::TrueSteps(run), [&](const logging::TrueStep& step) {
+    if (down && static_cast<double>(*down - step.landed) * run.spec.tick_period() < kToppling)
+      return false;
     const support_plan_t* const plan = run.plan.at((step.lifted + step.landed) / 2);
     return plan == nullptr || plan->in_contact[step.foot] != 0;
   });

@@ -4,6 +4,8 @@
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
+#include <map>
 #include <set>
 
 #include "components/framework/configuration/configuration.h"
@@ -32,6 +34,8 @@ constexpr double kMirror = 1e-3;     // share by which masses of both sides may 
 // A finger weighs at most this share of the robot's mass (a thumb of 150 g on a G1), and a limb at
 // least this one.
 constexpr double kFingerShare = 0.0075, kLimbShare = 0.03;
+// Share of the height of the robot's links, with joints at zero, below which is a foot and no hand.
+constexpr double kFootHeight = 0.2;
 constexpr double kPelvisShare = 0.14;  // of a person's mass (Winter)
 constexpr double kTrunkShare = 0.25;   // of the robot's mass: what moves more is no arm
 // cosine: two links whose origins lie beside each other within this mirror each other along an
@@ -389,7 +393,8 @@ class Repairer {
   }
 
   /// Joints of hands, whatever they are called: of light chains that part at one body beyond the
-  /// root, and those of less than a limb that others mimic. Eyes are such as well.
+  /// root, and those of less than a limb that others mimic. Eyes are such as well. What lies near
+  /// the ground is a foot, whose ankle's joints may mimic each other.
   std::set<std::string> Fingers() {
     const std::vector<MovingBody> bodies = MovingBodies();
     const double most = kFingerShare * Mass();
@@ -397,10 +402,21 @@ class Repairer {
     for (const SourceJoint& joint : source_.joints) {
       if (joint.mimic) mimicked.insert(joint.mimic->joint);
     }
+    const std::map<std::string, Isometry3d> poses = ZeroPoses();
+    double lowest = 0, highest = 0;
+    for (const auto& [name, pose] : poses) {
+      lowest = std::min(lowest, pose.translation().z());
+      highest = std::max(highest, pose.translation().z());
+    }
+    const double tall = std::max(highest - lowest, std::numeric_limits<double>::min());
     std::vector<bool> within(bodies.size(), false);
     for (size_t b = 1; b < bodies.size(); ++b) {
       const std::string& name = bodies[b].joint->name;
-      if (mimicked.contains(name) && bodies[b].beyond < kLimbShare * Mass()) fingers.insert(name);
+      const double height = (poses.at(bodies[b].joint->child).translation().z() - lowest) / tall;
+      if (mimicked.contains(name) && bodies[b].beyond < kLimbShare * Mass() &&
+          height > kFootHeight) {
+        fingers.insert(name);
+      }
       const std::vector<size_t>& limbs = bodies[b].limbs;
       const bool hand = limbs.size() > 1 && std::ranges::all_of(limbs, [&](size_t limb) {
                           return bodies[limb].beyond < most;

@@ -1,6 +1,7 @@
 #include "tools/scenario/catalog.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <fstream>
 #include <set>
@@ -18,21 +19,27 @@ namespace {
 
 constexpr char kEnding[] = ".pbtxt";
 
+// Folders by kind, and the message that their files hold.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 4> kKinds{
+    {{"scenarios", "Scenario"}, {"graphs", "Graph"}, {"sweeps", "Sweep"}, {"robots", "Robot"}}};
+
 /// The kind of files that hold this message; empty: one of several, or of none here.
 std::string_view KindOf(std::string_view message) {
-  for (const auto& [kind, name] : {std::pair{"scenarios", "Scenario"},
-                                   {"graphs", "Graph"},
-                                   {"sweeps", "Sweep"},
-                                   {"robots", "Robot"}}) {
+  for (const auto& [kind, name] : kKinds) {
     if (message == name) return kind;
   }
   return "";
 }
 
-/// True of a file that says itself to be of another kind: a scenario of a graph's name.
+/// True of a file that says itself, or whose folder says, to be of another kind: a scenario of a
+/// graph's name.
 bool IsOtherKind(const std::string& kind, const fs::path& file) {
+  if (kind == "drives") return false;
   const std::string_view own = KindOf(MessageNamedIn(file));
-  return !own.empty() && own != kind && kind != "drives";
+  if (!own.empty()) return own != kind;
+  const fs::path folder = file.parent_path().filename();
+  return folder != kind &&
+         std::ranges::any_of(kKinds, [&](const auto& each) { return folder == each.first; });
 }
 
 /// True for "base/NAME".

@@ -67,6 +67,7 @@ export function liveText(feed) {
   const again = feed.control?.run?.again ?? -1;
   if (feed.state !== 'live') return [feed.state, LIVE_TEXTS[feed.state]];
   if (again >= 0) return ['again', `○ made again, up to ${feed.run.timeOfTick(again).toFixed(3)} s`];
+  if (feed.run.numRows === 0) return ['connecting', '○ no tick yet'];  // of a run that has just gone back, too
   if (feed.live) return ['live', LIVE_TEXTS.live];
   return ['behind', Number.isFinite(feed.behind) ? `◐ ${feed.behind.toFixed(1)} s behind` : LIVE_TEXTS.connecting];
 }
@@ -110,6 +111,7 @@ export function playerBar(host, shared) {
     button('all', 'Show all that the page holds in the plots (0)', () => view.reset()));
   const showTime = () => {
     scrub.value = player.tick;
+    if (run.numRows === 0) return time.replaceChildren();
     time.replaceChildren(`${player.time.toFixed(3)} s`, element('span', {class: 'tick'}, `  tick ${player.tick}${rowText(run, player.row)}`));
   };
   player.addEventListener('time', showTime);

@@ -1,5 +1,6 @@
 // Checks, assumptions, latencies, channels and the run's information.
 import {element, table} from './dom.js';
+import {endText} from './live/control.js';
 import {latencyFigure, latencyTable} from './live/latency.js';
 import {formatNumber, withUnit} from './units.js';
 
@@ -128,7 +129,7 @@ export function stateBadges(run, feed) {
   if (!feed) return [partOf(run) ? badge(partOf(run)) : '', fallBadge(run.meta.events ?? []), verdictBadge(run)];
   const {status, state, control} = feed;
   if (status.ended) return [fallBadge(status.events), status.problem ? badge('ended; its checks cannot be told') : verdictBadge(run)];
-  if (control?.run?.ended) return [element('span', {class: 'badge failed'}, `ended: ${control.run.detail}`)];
+  if (control?.run?.ended) return [element('span', {class: `badge ${control.run.detail ? 'failed' : ''}`}, endText(control.run))];
   return [badge({connecting: 'connecting', live: 'in progress', ended: 'ended; its log is being checked',
     waiting: 'connection lost: whether it goes on is not known'}[state])];
 }

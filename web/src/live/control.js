@@ -3,6 +3,11 @@ const REPEAT = 33;        // ms between the pushes of one drag
 const HOLD = 0.15;        // s that one push lasts: the hand lets go by itself when its page is gone
 const FULL_REACH = 0.4;   // m from the grabbed point to the cursor at which a drag asks for the largest force
 
+/** How an interactive run has ended: as planned, or why. */
+export function endText({detail}) {
+  return detail ? `ended: ${detail}` : 'ended as planned';
+}
+
 /** Of the robot's answers; fires 'change' when they have, 'answer' with {detail: act} for an act of this page. */
 export class Control extends EventTarget {
   /** As the server told it last; undefined: this page only looks. */

@@ -1,5 +1,5 @@
 // The panel of a page that may act: stop, walk, settings, push, and the pace of an interactive run.
-import {Undo} from './control.js';
+import {endText, Undo} from './control.js';
 import {element, icon} from '../dom.js';
 import {LAG_PERIOD, liveText} from '../bar.js';
 import {formatNumber, withUnit} from '../units.js';
@@ -170,7 +170,7 @@ function pace(control, player, run) {
     for (const act of [go, tick]) disable(act, obstacle('go', control, run));
     speed.value = now.speed;
     back.disabled = again.disabled = !now.can_go_back || now.again >= 0;
-    state.textContent = `${now.again >= 0 ? `made again, up to tick ${now.again}` : now.ended ? `ended: ${now.detail}` : now.paused ? `waits at tick ${now.tick}`
+    state.textContent = `${now.again >= 0 ? `made again, up to tick ${now.again}` : now.ended ? endText(now) : now.paused ? `waits at tick ${now.tick}`
       : `runs at ${now.speed}×`}${now.branch > 0 ? `, branch ${now.branch}` : ''}`;
   }};
 }
