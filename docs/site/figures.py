@@ -150,11 +150,10 @@ def _(task, i, _, cells):
 def _(task, i, first, _):
     told = task.told() if "`" in first else task.told().replace(" --variant NAME", "")
     made = task.command(told, "--inline --no-reference", NAME=re.findall(r"`(\w+)`|$", first)[0])
-    figures, summary = made.summary()
-    task.put(i, "touch-down", figures["touch_down"])
-    height = [re.search(r"([\d.]+) mm above", e["detail"]) for e in summary["events"] if e["name"] == "touch_down"]
-    if height and height[-1]:
-        task.put(i, "left sole", height[-1][1])
+    for event in made.summary()[1]["events"]:
+        if event["name"] == "touch_down":
+            task.put(i, "touch-down", event["time"])
+            task.put(i, "left sole", re.search(r"([\d.]+) mm above", event["detail"])[1])
 
 
 @reads_row("experiments", "Of 300 blocks")
