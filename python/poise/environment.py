@@ -81,14 +81,18 @@ class Environment:
             out=os.fspath(out) if out else "", force=force, endless=duration is None)
         self.reset()
 
-    def reset(self, seed=None):
-        """Begins anew; every component of `components` is configured again. Returns the environment."""
+    def reset(self, seed=None, changes=None):
+        """Begins anew; every component of `components` is configured again. Returns the environment.
+
+        changes: of this run alone, on top of those that it was made with: another mass, friction, push.
+        """
         arguments = dict(self._arguments)
         if seed is not None:
             arguments["changes"] = {**arguments["changes"], "seed": int(seed)}
         if arguments["out"]:
             self._now = None  # lets go of the run's folder
-        self._now = _poise.Session(**arguments)
+        own = arguments["changes"]
+        self._now = _poise.Session(**{**arguments, "changes": {**own, "set": own["set"] + _changes(changes)["set"]}})
         self._arguments = arguments
         self._robot = None
         return self

@@ -37,6 +37,20 @@ class Steps(unittest.TestCase):
         env.step(60)
         self.assertFalse(np.array_equal(env["ROBOT_STATE"].q, first))
 
+    def test_reset_changes_one_run(self):
+        env = poise.Environment("stand", {"duration": 1.5})
+        env.step(500)
+        own = env["ROBOT_STATE"].q
+        env.reset(changes={"sim.joint_friction": False}).step(500)
+        alike = poise.Environment("stand", {"duration": 1.5, "sim.joint_friction": False})
+        alike.step(500)
+        np.testing.assert_array_equal(env["ROBOT_STATE"].q, alike["ROBOT_STATE"].q)
+        self.assertFalse(np.array_equal(env["ROBOT_STATE"].q, own))
+        with self.assertRaisesRegex(poise.ConfigError, "no_such"):
+            env.reset(changes={"sim.no_such": 1})
+        env.reset().step(500)
+        np.testing.assert_array_equal(env["ROBOT_STATE"].q, own)
+
     def test_it_walks_where_it_is_told(self):
         env = poise.Environment("walk", {"step_planner.walk.command": "", "duration": 60})
         env.step(500)

@@ -111,7 +111,7 @@ export function playerBar(host, shared) {
     button('all', 'Show all that the page holds in the plots (0)', () => view.reset()));
   const showTime = () => {
     scrub.value = player.tick;
-    if (run.numRows === 0) return time.replaceChildren();
+    if (player.tick < run.firstTick) return time.replaceChildren();  // nothing has come yet, or again
     time.replaceChildren(`${player.time.toFixed(3)} s`, element('span', {class: 'tick'}, `  tick ${player.tick}${rowText(run, player.row)}`));
   };
   player.addEventListener('time', showTime);
