@@ -66,8 +66,7 @@ int main(int argc, char** argv) {
   app.footer(
       "poise COMMAND --help says more. Exit code: 0 good, 1 a check or the run failed, 2 "
       "wrong usage or configuration, 3 in real time, nothing failed but that processes were lost "
-      "and "
-      "replaced or the machine was late.\n"
+      "and replaced or the machine was late.\n"
       "Start with: poise run, then poise report");
   poise::Command command;
   poise::AddRunCommand(&app, &command);

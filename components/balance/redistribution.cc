@@ -29,8 +29,9 @@ double ShareWithin(const VectorRef& limit, const VectorRef& torque, const Vector
   double share = 1;
   for (Eigen::Index i = 0; i < torque.size(); ++i) {
     const double room = limit[i] - (change[i] < 0 ? -torque[i] : torque[i]);
-    if (room >= 0 && std::abs(change[i]) > room)
+    if (room >= 0 && std::abs(change[i]) > room) {
       share = std::min(share, room / std::abs(change[i]));
+    }
   }
   return share;
 }

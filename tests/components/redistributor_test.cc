@@ -308,28 +308,39 @@ TEST(Redistributor, TheRampTakesTheTorqueJumpOutOfTheSwitch) {
   RecordProperty("jump_without", testing::PrintToString(without.largest_step));
 }
 
-// What balancing asks of a joint leaves half of what redistribution would add to it: half of the
-// load is moved, and the wrenches announced are the ones that this torque gives.
+/// The redistributor alone while a standing robot's left foot is unloaded.
+struct Unloading {
+  Chain chain{TestRobot::kDyros, "phase { }", MonitorConfig(false), RedistributorText()};
+  ControlContext context{TestRobot::kDyros};
+  Harness<Redistributor> alone{&context, RedistributorText()};
+  support_plan_t plan;
+  balance_torque_t balance;
+
+  Unloading() {
+    chain.Run(StandingState(chain.model()), 0);
+    plan = chain.plan();
+    plan.transition = support_plan_t::TRANSITION_UNLOADING;
+    plan.transition_foot = 1;
+    balance = chain.balance();
+    alone.Bind("robot_state", &chain.state());
+    alone.Bind("support_plan", &plan);
+    alone.Bind("balance_torque", &balance);
+  }
+};
+
+// Balancing leaves a joint half of what redistribution would add to its torque: half of the load is
+// moved, and η says so.
 TEST(Redistributor, MovesNoMoreLoadThanTheMotorsCanHold) {
-  Chain chain(TestRobot::kDyros, "phase { }", MonitorConfig(false), RedistributorText());
-  const robot::RobotState standing = StandingState(chain.model());
-  chain.Run(standing, 0);
-  ControlContext context(TestRobot::kDyros);
-  Harness<Redistributor> alone(&context, RedistributorText());
-  support_plan_t plan = chain.plan();
-  plan.transition = support_plan_t::TRANSITION_UNLOADING;
-  plan.transition_foot = 1;
+  Unloading unloading;
+  auto& [chain, context, alone, plan, balance] = unloading;
   plan.transition_progress = 0.9;
-  balance_torque_t balance = chain.balance();
-  alone.Bind("robot_state", &chain.state());
-  alone.Bind("support_plan", &plan);
-  alone.Bind("balance_torque", &balance);
   alone.Run(TickAt(0));
   const joint_command_t free = alone.output<joint_command_t>();
   size_t most = 0;
   for (size_t j = 0; j < free.torque.size(); ++j) {
-    if (std::abs(free.redistribution_torque[j]) > std::abs(free.redistribution_torque[most]))
+    if (std::abs(free.redistribution_torque[j]) > std::abs(free.redistribution_torque[most])) {
       most = j;
+    }
   }
   const double change = free.redistribution_torque[most];
   ASSERT_GT(std::abs(change), 5);
@@ -348,17 +359,8 @@ TEST(Redistributor, MovesNoMoreLoadThanTheMotorsCanHold) {
 // The COM further from the stance sole's centre than the sole's reduced half width: the ramp stops
 // at the last ratio that the stance foot can bear.
 TEST(Redistributor, TheRampEndsWhereTheStanceFootWouldTip) {
-  Chain chain(TestRobot::kDyros, "phase { }", MonitorConfig(false), RedistributorText());
-  const robot::RobotState standing = StandingState(chain.model());
-  chain.Run(standing, 0);
-  ControlContext context(TestRobot::kDyros);
-  Harness<Redistributor> alone(&context, RedistributorText());
-  support_plan_t plan = chain.plan();
-  plan.transition = support_plan_t::TRANSITION_UNLOADING;
-  plan.transition_foot = 1;
-  alone.Bind("robot_state", &chain.state());
-  alone.Bind("support_plan", &plan);
-  alone.Bind("balance_torque", &chain.balance());
+  Unloading unloading;
+  auto& [chain, context, alone, plan, balance] = unloading;
   double last = 0.5;
   for (double progress : {0.0, 0.3, 0.6, 1.0}) {
     plan.transition_progress = progress;
@@ -370,7 +372,7 @@ TEST(Redistributor, TheRampEndsWhereTheStanceFootWouldTip) {
   }
   // Lever: M_x of the right foot per load = its distance from the CoP, less the left foot's share
   // of the width.
-  const robot::RobotData data = robot::Evaluate(chain.model(), standing);
+  const robot::RobotData data = robot::Evaluate(chain.model(), StandingState(chain.model()));
   const double width = (data.foot_pose[1].translation() - data.foot_pose[0].translation()).y();
   EXPECT_NEAR(last, 0.5 + 0.05 / width, 1e-6);
 }

@@ -63,8 +63,9 @@ std::string TellWalk(const logging::RunRecord& run, std::ptrdiff_t steps) {
 std::ptrdiff_t UnplannedSteps(const logging::RunRecord& run) {
   const std::optional<int64_t> down = logging::DownTick(run);
   return std::ranges::count_if(logging::TrueSteps(run), [&](const logging::TrueStep& step) {
-    if (down && static_cast<double>(*down - step.landed) * run.spec.tick_period() < kToppling)
+    if (down && static_cast<double>(*down - step.landed) * run.spec.tick_period() < kToppling) {
       return false;
+    }
     const support_plan_t* const plan = run.plan.at((step.lifted + step.landed) / 2);
     return plan == nullptr || plan->in_contact[step.foot] != 0;
   });

@@ -34,7 +34,8 @@ constexpr double kMirror = 1e-3;     // share by which masses of both sides may 
 // A finger weighs at most this share of the robot's mass (a thumb of 150 g on a G1), and a limb at
 // least this one.
 constexpr double kFingerShare = 0.0075, kLimbShare = 0.03;
-// Share of the height of the robot's links, with joints at zero, below which is a foot and no hand.
+// A link below this share of the robot's height, with joints at zero, belongs to a foot and to no
+// hand.
 constexpr double kFootHeight = 0.2;
 constexpr double kPelvisShare = 0.14;  // of a person's mass (Winter)
 constexpr double kTrunkShare = 0.25;   // of the robot's mass: what moves more is no arm
