@@ -15,65 +15,55 @@ using robot::Foot;
 using robot::Other;
 using stepping::QuasiStaticWalk;
 using stepping::Stage;
-using stepping::WalkStage;
 using Report = ::steps::footsteps_t;
 
 constexpr int kCorners = stepping::kRegionDirections;
 constexpr double kRegionPeriod = 0.02;  // s: what looks on draws no faster
 constexpr double kLeastHeight = 0.1;    // m, of the COM above the sole: below, it has fallen
 
-static_assert(sizeof(Report::x) / sizeof(double) >= QuasiStaticWalk::kPlannedSteps);
+static_assert(sizeof(Report::x) / sizeof(double) == stepping::ContactPlan::kMost);
 static_assert(sizeof(Report::region_x) / sizeof(double) ==
               (stepping::kMostRegionSteps + 1) * kCorners);
-
-bool UnderWay(const stepping::Recovery& recovery) {
-  return recovery.stage() == Stage::kUnloading || recovery.stage() == Stage::kSwinging;
-}
 
 /// The foot that carries, or is to while the other steps; none: both do.
 std::optional<Foot> Stance(const FootstepInput& input, const stepping::Recovery* recovery,
                            const QuasiStaticWalk* walk) {
   if (walk != nullptr && walk->active()) {
-    if (walk->stage() == WalkStage::kStopping) return {};
+    if (walk->stage() == Stage::kCatching) return {};
     return Other(walk->stepping_foot());
   }
-  if (recovery != nullptr && UnderWay(*recovery)) return Other(recovery->plan().foot);
+  if (recovery != nullptr && !recovery->steps().empty()) {
+    return Other(recovery->steps().first().foot);
+  }
   const bool right = input.in_contact[Foot::kRight];
   if (right == input.in_contact[Foot::kLeft]) return {};
   return right ? Foot::kRight : Foot::kLeft;
 }
 
-void Put(int i, Foot foot, const Eigen::Vector2d& at, double yaw, double ground, double left,
-         Report* out) {
-  out->foot[i] = static_cast<int8_t>(foot);
-  out->x[i] = at.x();
-  out->y[i] = at.y();
+void Put(int i, const stepping::Footstep& step, double ground, double left, Report* out) {
+  out->foot[i] = static_cast<int8_t>(step.foot);
+  out->x[i] = step.at.position.x();
+  out->y[i] = step.at.position.y();
   out->z[i] = ground;
-  out->yaw[i] = yaw;
+  out->yaw[i] = step.at.yaw;
   out->touch_down[i] = std::max(0.0, left);
 }
 
 void ReportPlanned(const FootstepInput& input, const stepping::Recovery* recovery,
                    const QuasiStaticWalk* walk, Report* out) {
+  const stepping::ContactPlan* const plan = walk != nullptr && walk->active() ? &walk->steps()
+                                            : recovery != nullptr ? &recovery->steps()
+                                                                  : nullptr;
   int count = 0;
-  if (walk != nullptr && walk->active()) {
-    std::array<QuasiStaticWalk::PlannedStep, QuasiStaticWalk::kPlannedSteps> planned;
-    const int all = walk->Planned(&planned);
-    const double ground = input.sole[Other(walk->stepping_foot())].translation().z();
-    for (const QuasiStaticWalk::PlannedStep& step : planned) {
-      if (count == all) break;
-      Put(count++, step.foot, step.at.position, step.at.yaw, ground, step.touch_down - input.time,
-          out);
+  if (plan != nullptr && !plan->empty()) {
+    const double ground = input.sole[Other(plan->first().foot)].translation().z();
+    for (const stepping::Footstep& step : *plan) {
+      Put(count++, step, ground, step.touch_down - input.time, out);
     }
-  } else if (recovery != nullptr && UnderWay(*recovery)) {
-    const stepping::StepPlan& plan = recovery->plan();
-    const double ground = input.sole[Other(plan.foot)].translation().z();
-    Put(count++, plan.foot, plan.foothold, plan.yaw, ground, recovery->touch_down() - input.time,
-        out);
   }
   out->planned = static_cast<int8_t>(count);
-  for (int i = count; i < QuasiStaticWalk::kPlannedSteps; ++i) {
-    Put(i, Foot::kRight, {0, 0}, 0, 0, 0, out);
+  for (int i = count; i < static_cast<int>(stepping::ContactPlan::kMost); ++i) {
+    Put(i, {}, 0, 0, out);
   }
 }
 

@@ -197,6 +197,16 @@ balance::ConvexPolygon StanceSole(const robot::FootModel& foot, const StepPlanne
   return sole;
 }
 
+LandingSpec MakeLandingSpec(const ContactConfirmation& config) {
+  LandingSpec spec;
+  spec.touch_load = config.touch_load();
+  spec.release_load = config.release_load();
+  spec.press_load = config.press_load();
+  spec.settle = config.settle_duration();
+  spec.search_depth = config.search_depth();
+  return spec;
+}
+
 void CheckStepPlannerConfig(const StepPlannerConfig& config) {
   CheckContact(config.contact());
   CheckRecoveryConfig(config.recovery());

@@ -18,6 +18,7 @@
 #include "components/robot/posture.h"
 #include "components/robot/sole.h"
 #include "components/step_planner/leg_limits.h"
+#include "components/step_planner/planner_config.h"
 
 namespace poise {
 namespace {
@@ -188,9 +189,11 @@ stepping::RecoverySpec MakeRecoverySpec(const RecoveryConfig& config,
   spec.margin_to_sole_edge = config.margin_to_sole_edge();
   spec.load = motion.load();
   spec.swing = {motion.clearance(), kTouchSpeed, kFreeze};
-  spec.touch_load = contact.touch_load();
-  spec.observed_load = kObservedLoad * model.total_mass() * robot::kGravity;
-  spec.search_depth = contact.search_depth();
+  spec.landing = MakeLandingSpec(contact);
+  spec.landing.observed_load = kObservedLoad * model.total_mass() * robot::kGravity;
+  // The first load counts: the foot bounces, and six milliseconds of steady load came 0.12 s late.
+  spec.landing.touch_duration = spec.landing.settle = 0;
+  spec.landing.search_speed = kTouchSpeed;
   spec.gain = motion.gain();
   spec.turn_share = TurningInertia(model) / (model.total_mass() * robot::kGravity);
   spec.height_rate = motion.height_rate();

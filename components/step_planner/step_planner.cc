@@ -67,9 +67,9 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   generator_.emplace(config.com_lag());
   stance_follower_ = StanceFollower(kFollowFrom);
   ConfigureLimits(config);
-  contact_ = config.contact();
-  landing_ = robot::FootArray<Landing>(Landing(contact_));
-  contact_loss_ = robot::FootArray<ContactLoss>(ContactLoss(contact_));
+  const LandingSpec landing = MakeLandingSpec(config.contact());
+  landing_ = robot::FootArray<Landing>(Landing(landing));
+  contact_loss_ = robot::FootArray<ContactLoss>(ContactLoss(landing.release_load));
   walks_by_steps_ = config.walk().enabled() && !config.walk().quasi_static();
   makes_steps_ = config.recovery().enabled() || walks_by_steps_;
   if (makes_steps_) {
@@ -197,8 +197,8 @@ stepping::WalkCommand StepPlanner::WalkCommandAt(double time) const {
   bool stepping = operator_walk_.stepping;
   // A recovery counts a step as it begins, a walk as it ends.
   if (operator_walk_.one_step && NumSteps() == operator_walk_.steps_before) {
-    const stepping::WalkStage stage = walk_.stage();
-    stepping = stage != stepping::WalkStage::kSwinging && stage != stepping::WalkStage::kTouching;
+    const stepping::Stage stage = walk_.stage();
+    stepping = stage != stepping::Stage::kSwinging && stage != stepping::Stage::kTouching;
   }
   if (!stepping) return {};
   return {{v[0], v[1]}, v[2], true};
@@ -293,10 +293,7 @@ stepping::StepInput StepPlanner::SeeSteps(double time, const robot::FootArray<do
   input.turning = data.body_angular_velocity[static_cast<size_t>(model_->body_task_body())];
   input.sole = data.foot_pose;
   input.load = load;
-  for (const Foot f : kFeet) {
-    const double deviation = LoadDeviation(f);
-    if (deviation > 0) input.least_load[f] = LoadLevels(contact_, deviation).touch;
-  }
+  for (const Foot f : kFeet) input.load_deviation[f] = LoadDeviation(f);
   input.in_contact = in_contact_;
   input.com_height = references_.com.position.z();
   input.step_needed = support_plan_->step_needed != 0;
@@ -390,7 +387,7 @@ void StepPlanner::Report(double time, const Capture& capture) {
   }
   if (!makes_steps_ && !walks_quasi_static_) return;
   const bool walking = walks_quasi_static_ && owner_ != FeetOwner::kRecovery;
-  ReportStepping(walking ? walk_.status(estimate.sole) : recovery_.status(),
+  ReportStepping(walking ? walk_.status() : recovery_.status(),
                  walking && walk_.active() ? walk_.command() : recovery_.command(), time,
                  estimate.sole, plan);
   plan->num_steps = recovery_.num_steps() + walk_.num_begun();

@@ -113,9 +113,8 @@ class StepPlanner : public Component, public Operated {
   std::optional<ReferenceGenerator> generator_;
   StanceFollower stance_follower_{0};
   std::optional<HipStrategy> hip_strategy_;
-  ContactConfirmation contact_;
-  robot::FootArray<Landing> landing_{Landing(contact_)};
-  robot::FootArray<ContactLoss> contact_loss_{ContactLoss(contact_)};
+  robot::FootArray<Landing> landing_{Landing(LandingSpec())};
+  robot::FootArray<ContactLoss> contact_loss_{ContactLoss(0)};
   HeldCondition step_needed_;
   bool makes_steps_ = false;  // recovery_ is there
   stepping::Recovery recovery_;

@@ -15,6 +15,7 @@
 #include "components/robot/posture.h"
 #include "components/robot/sole.h"
 #include "components/step_planner/leg_limits.h"
+#include "components/step_planner/planner_config.h"
 #include "components/step_planner/recovery_config.h"
 
 namespace poise {
@@ -77,6 +78,9 @@ constexpr double kTurnAcceleration = 0.2;  // rad/s² with which the turn rate i
 constexpr double kAcceleration = 0.1;     // m/s² with which the commanded velocity is approached
 constexpr double kJointReserve = 0.1;     // rad off the joints' limits at footholds
 constexpr double kTouchDuration = 0.002;  // s of contact.touch_load that are a landing
+// A foot that touches is let go with a time constant of this share of its settling, which counts
+// as kLongestRelaxing, s, at most.
+constexpr double kRelaxShare = 0.25, kLongestRelaxing = 0.06;
 
 constexpr double kRounding = 1e-6;
 
@@ -255,7 +259,6 @@ stepping::QuasiStaticSpec MakeQuasiStaticSpec(const WalkConfig& config,
   spec.start = scale.Time(kStart);
   spec.unload = motion.unload();
   spec.swing = motion.swing();
-  spec.settle = motion.settle();
   spec.load = motion.load();
   spec.step = {choice.limits().spacing, choice.reach().least_spacing(),
                config.has_longest() ? config.longest() : scale.Length(config.longest()),
@@ -265,9 +268,13 @@ stepping::QuasiStaticSpec MakeQuasiStaticSpec(const WalkConfig& config,
   spec.foot = {motion.clearance(),  scale.Speed(kTouchSpeed),
                scale.Time(kFreeze), kRiseShare * motion.clearance(),
                kAcrossShare,        kWaitShare};
-  spec.touch_load = contact.touch_load();
-  spec.touch_duration = kTouchDuration;
-  spec.search_depth = contact.search_depth();
+  spec.landing = MakeLandingSpec(contact);
+  spec.landing.touch_duration = kTouchDuration;
+  spec.landing.settle = motion.settle();
+  spec.landing.search_speed = scale.Speed(kTouchSpeed);
+  spec.landing.relax_time = kRelaxShare * std::min(motion.settle(), kLongestRelaxing);
+  spec.landing.press_load = std::max(kPressShare * weight, contact.touch_load());
+  spec.landing.presses = true;
   spec.gain = motion.gain();
   spec.most_offset = kOffsetShare * radius;
   spec.com_lowering = motion.com_lowering();
@@ -277,7 +284,6 @@ stepping::QuasiStaticSpec MakeQuasiStaticSpec(const WalkConfig& config,
   spec.still_speed = scale.Speed(kStillSpeed);
   spec.still_time = scale.Time(kStillTime);
   spec.press_share = kPressShare;
-  spec.press_load = std::max(kPressShare * weight, spec.touch_load);
   spec.lift_off_distance = LiftOffDistance(model, choice.limits());
   spec.most_return = scale.Length(kMostReturn);
   spec.load_lead = kLoadLeadShare * radius;

@@ -3,7 +3,6 @@
 
 #include "components/framework/state_archive.h"
 #include "components/framework/tick_time.h"
-#include "components/step_planner/contact/contact_confirmation.pb.h"
 
 namespace poise {
 
@@ -14,7 +13,7 @@ class ContactLoss {
   /// s; longer than the rattle of a foot that a push rocks.
   static constexpr double kLostDuration = 0.1;
 
-  explicit ContactLoss(const ContactConfirmation& config) : release_load_(config.release_load()) {}
+  explicit ContactLoss(double release_load) : release_load_(release_load) {}
 
   /// `time` in s, not decreasing; `load` in N, positive when the sole is pressed.
   /// `deviation`: N, of an observed load, which must be below that instead where it is more; 0 of a

@@ -10,22 +10,20 @@ namespace {
 constexpr double kVelocityTime = 0.05;
 // Standard deviations of an observed load that are a touch, and below which it is none.
 constexpr double kTouchDeviations = 3, kReleaseDeviations = 1.2;
-// Time constant, s, with which a touching sole's reference comes to where the sole stands: a
-// fraction of settle_duration's default.
-constexpr double kRelaxTime = 0.1;
-// m/s at which a foot without contact at its reference's end goes on downward: slow enough that the
-// load stops it before it tips the robot.
-constexpr double kSearchSpeed = 0.03;
+// Share of the press' load that counts as pressed: a sole that lies down rocks between loads.
+constexpr double kPressed = 0.8;
 // m that a foot rises which found no surface: clear of what it may have touched with its edge.
 constexpr double kRetractHeight = 0.05;
 
 }  // namespace
 
-LoadLevels::LoadLevels(const ContactConfirmation& config, double deviation)
-    : touch(std::max(config.touch_load(), kTouchDeviations * deviation)),
-      release(std::max(config.release_load(), kReleaseDeviations * deviation)),
-      press(std::max(config.press_load(), 2 * touch)) {
-  if (deviation <= 0) press = config.press_load();
+LoadLevels::LoadLevels(const LandingSpec& spec, double deviation)
+    : touch(std::max(spec.touch_load, kTouchDeviations * deviation)),
+      release(std::max(spec.release_load, kReleaseDeviations * deviation)),
+      press(spec.press_load) {
+  if (deviation <= 0) return;
+  touch = std::max(touch, spec.observed_load);
+  press = std::max(press, 2 * touch);
 }
 
 bool TouchDetector::Update(double time, double load, const LoadLevels& levels) {
@@ -39,6 +37,13 @@ void Landing::LiftOff(double z) {
   state_ = State::kSwing;
   lowered_ = false;
   end_height_ = z;
+}
+
+void Landing::BeginSwing(double z, double rises_until) {
+  LiftOff(z);
+  touch_.Reset(false);
+  left_ = true;
+  move_end_ = rises_until;
 }
 
 bool Landing::BeginMove(double from, double to, double end) {
@@ -65,20 +70,21 @@ void Landing::Measure(double time, double load, double deviation) {
   period_ = TickPeriod(time - time_);
   time_ = time;
   load_ = load;
-  levels_ = LoadLevels(config_, deviation);
+  levels_ = LoadLevels(spec_, deviation);
   const bool before = touch_.touching();
   if (touch_.Update(time, load, levels_) && !before) touched_ = time;
+  if (spec_.presses && load < kPressed * levels_.press) touched_ = time;
 }
 
 bool Landing::confirmed() const {
   if (!touch_.touching()) return false;
   if (state_ == State::kSwing) return !left_;
   return state_ == State::kTouching &&
-         time_ - touched_ >= config_.settle_duration() - kTimeTolerance;
+         time_ - touched_ >= spec_.settle - kTimeTolerance;
 }
 
 bool Landing::SearchBegins(bool before_touch_down, bool due) const {
-  if (!config_.required() || !before_touch_down) return false;
+  if (!before_touch_down) return false;
   return due || (lowered_ && time_ >= move_end_ - kTimeTolerance);
 }
 
@@ -106,14 +112,14 @@ void Landing::AdvanceState(bool before_touch_down, bool due, const Eigen::Isomet
     case State::kSearching: {
       // The reference leads the sole by what friction and load ask for; were the sole held up by
       // something else, it must not run away.
-      const double depth = config_.search_depth();
+      const double depth = spec_.search_depth;
       if (touching) {
         state_ = State::kTouching;
       } else if (sole.translation().z() <= end_height_ - depth ||
                  reference_.position.z() <= end_height_ - 2 * depth) {
         state_ = State::kRetracted;
         retreat_.Begin(reference_, reference_.position + kRetractHeight * Eigen::Vector3d::UnitZ(),
-                       time_, kRetractHeight / kSearchSpeed);
+                       time_, kRetractHeight / spec_.search_speed);
       }
       break;
     }
@@ -127,28 +133,34 @@ void Landing::AdvanceState(bool before_touch_down, bool due, const Eigen::Isomet
 
 void Landing::Search() {
   const double missing = std::max(1 - load_ / levels_.press, 0.0);
-  const Eigen::Vector3d velocity(0, 0, -kSearchSpeed * missing);
+  const Eigen::Vector3d velocity(0, 0, -spec_.search_speed * missing);
   reference_.velocity += Share(kVelocityTime) * (velocity - reference_.velocity);
   reference_.position += period_ * reference_.velocity;
 }
 
 void Landing::Touch(const Eigen::Isometry3d& sole) {
-  const double loaded =
-      std::clamp((load_ - levels_.release) / (levels_.touch - levels_.release), 0.0, 1.0);
-  Eigen::Vector3d share = Eigen::Vector3d::Constant(Share(kRelaxTime));
-  share.z() *= loaded;
+  Eigen::Vector3d share = Eigen::Vector3d::Constant(Share(spec_.relax_time));
+  double down = 0;
+  if (spec_.presses) {
+    share.z() = 0;
+    down = std::clamp(1 - load_ / levels_.press, -1.0, 1.0);
+  } else {
+    const double loaded =
+        std::clamp((load_ - levels_.release) / (levels_.touch - levels_.release), 0.0, 1.0);
+    share.z() *= loaded;
+    down = 1 - loaded;
+  }
   reference_.position += share.cwiseProduct(sole.translation() - reference_.position);
-  reference_.position.z() -= period_ * kSearchSpeed * (1 - loaded);
+  reference_.position.z() -= period_ * spec_.search_speed * down;
   // Not that of the reference's coming back, which would lift the foot.
-  reference_.velocity -= Share(kVelocityTime) * reference_.velocity;
+  reference_.velocity -= Share(std::min(spec_.relax_time, kVelocityTime)) * reference_.velocity;
   rotation_ = Eigen::Quaterniond(rotation_)
-                  .slerp(Share(kRelaxTime), Eigen::Quaterniond(sole.linear()))
+                  .slerp(Share(spec_.relax_time), Eigen::Quaterniond(sole.linear()))
                   .toRotationMatrix();
 }
 
 bool Landing::Update(bool before_touch_down, bool due, const Eigen::Isometry3d& sole,
                      PointMotion* reference, Eigen::Matrix3d* rotation) {
-  if (!config_.required()) return false;
   AdvanceState(before_touch_down, due, sole, *reference, *rotation);
   switch (state_) {
     case State::kSwing:

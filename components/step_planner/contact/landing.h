@@ -8,27 +8,41 @@
 #include "components/framework/tick_time.h"
 #include "components/messages/motion.h"
 #include "components/messages/quintic_move.h"
-#include "components/step_planner/contact/contact_confirmation.pb.h"
 
 namespace poise {
 
-/// N: the configured loads, raised where the load is not known so well.
+/// How a foot comes down.
+struct LandingSpec {
+  double touch_load = 0;     ///< N on the sole that are contact
+  double release_load = 0;   ///< N below which it is lost again
+  double press_load = 0;     ///< N at which the search comes to a stand
+  double observed_load = 0;  ///< N that an observed load must be above at least to be contact
+  /// s that a load must last, or its loss: ten periods of 500 Hz, longer than the sensor's noise.
+  double touch_duration = 0.02;
+  double settle = 0;        ///< s from the touch until the foot counts as a contact
+  double search_depth = 0;  ///< m that it goes on downward at most
+  /// m/s, with which it does: slow enough that the load stops it before it tips the robot.
+  double search_speed = 0.03;
+  /// s, time constant with which a touching foot's reference comes to where the sole stands.
+  double relax_time = 0.1;
+  /// A touching foot is pressed down with press_load, and settles while it is; else it is let go.
+  bool presses = false;
+};
+
+/// N: the loads of a landing, raised where the load is not known so well.
 struct LoadLevels {
   double touch = 0, release = 0, press = 0;
 
-  /// `deviation`: N, of an observed load; 0 of a measured one, whose noise the configured loads
-  /// allow for.
-  LoadLevels(const ContactConfirmation& config, double deviation);
+  /// `deviation`: N, of an observed load; 0 of a measured one, whose noise the loads allow for.
+  LoadLevels(const LandingSpec& spec, double deviation);
 };
 
 /// Contact from a measured load, with hysteresis: it is made when the load has stayed above
 /// touch_load for a duration, and lost when it has stayed below release_load as long.
 class TouchDetector {
  public:
-  /// s that either must last: ten periods of 500 Hz, longer than the sensor's noise.
-  static constexpr double kTouchDuration = 0.02;
-
-  explicit TouchDetector(double duration = kTouchDuration) : duration_(duration) {}
+  /// `duration`: s that either must last.
+  explicit TouchDetector(double duration) : duration_(duration) {}
 
   /// `touching`: what holds until the load says otherwise.
   void Reset(bool touching) { touching_.Reset(touching); }
@@ -44,9 +58,9 @@ class TouchDetector {
 
 /// One foot from lift-off to double support. Pure function of its calls.
 ///
-/// Searching: the reference goes on downward at kSearchSpeed · (1 − load / press_load), which
+/// Searching: the reference goes on downward at search_speed · (1 − load / press_load), which
 /// presses until contact counts in spite of joint friction, and never much harder.
-/// Touching: the foot is let go. Its reference comes to where the sole stands, so that the task
+/// Touching: the foot is let go, or pressed in z. Its reference comes to where the sole stands, so that the task
 /// asks for no acceleration and is a damper only: the sole settles flat, yields to a surface that
 /// rises, and the change of the model's contact makes no step of the torque. In z this is mixed
 /// with the search, by the load from touch_load (let go) down to release_load (search), so that
@@ -55,11 +69,15 @@ class Landing {
  public:
   enum class State { kSwing, kSearching, kTouching, kRetracted };
 
-  explicit Landing(const ContactConfirmation& config) : config_(config), levels_(config, 0) {}
+  explicit Landing(const LandingSpec& spec)
+      : spec_(spec), touch_(spec.touch_duration), levels_(spec, 0) {}
 
   /// The foot is free from here on, its reference at rest at height `z`, m. It counts as touching
   /// the ground that it leaves until its load says that it has left.
   void LiftOff(double z);
+  /// The foot swings to ground at height `z`, m; what it meets before `rises_until`, s, is left
+  /// behind.
+  void BeginSwing(double z, double rises_until);
   /// Its reference is to move from height `from` to `to`, m, until `end`, s. A foot that touches is
   /// not lowered any further, and a retracted one stays: false, the move is not to be made.
   bool BeginMove(double from, double to, double end);
@@ -93,13 +111,13 @@ class Landing {
   void Search();
   void Touch(const Eigen::Isometry3d& sole);
 
-  ContactConfirmation config_;
+  LandingSpec spec_;
   TouchDetector touch_;
   State state_ = State::kSwing;
   double time_ = 0, period_ = 0;  // s, of this tick, since the last
   double load_ = 0;               // N
   LoadLevels levels_;
-  double touched_ = 0;     // s, when the touch began
+  double touched_ = 0;     // s, when the touch, or the press' load, began
   bool left_ = false;      // the ground or surface from which the last move started
   bool lowered_ = false;   // the last move went down
   double move_end_ = 0;    // s

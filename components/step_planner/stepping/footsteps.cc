@@ -15,11 +15,11 @@ Vector2d Turned(double yaw, const Vector2d& point) { return Eigen::Rotation2Dd(y
 
 }  // namespace
 
-Footstep NextFootstep(const Footstep& stance, Foot foot, const WalkCommand& command, double period,
+Foothold NextFootstep(const Foothold& stance, Foot foot, const WalkCommand& command, double period,
                       const FootstepLimits& limits) {
   const double side = Side(foot);
   if (command.period > 0) {
-    const Footstep& asked = command.stride[foot];
+    const Foothold& asked = command.stride[foot];
     const double ahead = std::clamp(asked.position.x(), -limits.longest, limits.longest);
     const double apart =
         std::clamp(side * asked.position.y(), limits.least_spacing, limits.spacing + limits.widest);
@@ -32,7 +32,7 @@ Footstep NextFootstep(const Footstep& stance, Foot foot, const WalkCommand& comm
   const double turn = std::clamp(outwards(command.turn_rate), -limits.most_turn, limits.most_turn);
   const Vector2d way(std::clamp(period * command.velocity.x(), -limits.longest, limits.longest),
                      std::clamp(outwards(command.velocity.y()), -limits.widest, limits.widest));
-  Footstep step;
+  Foothold step;
   step.yaw = stance.yaw + turn;
   // The middle between the feet goes along the mean heading.
   const Vector2d from_stance = half + Turned(0.5 * turn, way) + Turned(turn, half);
@@ -41,12 +41,12 @@ Footstep NextFootstep(const Footstep& stance, Foot foot, const WalkCommand& comm
   return step;
 }
 
-Stride NominalStride(const Footstep& stance, Foot foot, const WalkCommand& command, double period,
+Stride NominalStride(const Foothold& stance, Foot foot, const WalkCommand& command, double period,
                      double frequency, const FootstepLimits& limits) {
   const double growth = std::exp(frequency * period);
   Stride stride;
   stride.next = NextFootstep(stance, foot, command, period, limits);
-  const Footstep after = NextFootstep(stride.next, Other(foot), command, period, limits);
+  const Foothold after = NextFootstep(stride.next, Other(foot), command, period, limits);
   const Vector2d first = stride.next.position - stance.position;
   const Vector2d second = after.position - stride.next.position;
   const double whole = growth * growth - 1;
@@ -55,14 +55,14 @@ Stride NominalStride(const Footstep& stance, Foot foot, const WalkCommand& comma
   return stride;
 }
 
-Footstep Towards(const Footstep& step, const Footstep& wanted, double most, const Footstep& stance,
+Foothold Towards(const Foothold& step, const Foothold& wanted, double most, const Foothold& stance,
                  Foot foot, const FootstepLimits& limits) {
   const double side = Side(foot);
   Vector2d way = wanted.position - step.position;
   const double size = way.norm();
   if (size > most) way *= most / size;
   const double turn = std::remainder(wanted.yaw - step.yaw, 2 * M_PI);
-  Footstep moved{step.position + way, step.yaw + std::clamp(turn, -most, most)};
+  Foothold moved{step.position + way, step.yaw + std::clamp(turn, -most, most)};
   Vector2d beside = Turned(-stance.yaw, moved.position - stance.position);
   beside.y() = side * std::max(side * beside.y(), limits.least_spacing);
   moved.position = stance.position + Turned(stance.yaw, beside);

@@ -9,7 +9,7 @@
 namespace poise::stepping {
 
 /// A level sole: its centre, m, and its heading, rad.
-struct Footstep {
+struct Foothold {
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
   double yaw = 0;
 
@@ -24,7 +24,7 @@ struct WalkCommand {
   /// s from touch-down to touch-down; above 0, `stride` says where each foot comes down from the
   /// other sole, in its axes, and `velocity` and `turn_rate` are what that comes to.
   double period = 0;
-  FootArray<Footstep> stride{};
+  FootArray<Foothold> stride{};
 
   bool in_place() const { return velocity.isZero(0) && turn_rate == 0; }
   void Archive(StateArchive* archive) {
@@ -43,24 +43,24 @@ struct FootstepLimits {
 /// Where `foot` comes down when the other stands at `stance`, for a step every `period` s. Ahead
 /// each step goes half a stride. To the side, and in a turn, the foot of that side goes out by what
 /// two steps ask for and the other comes beside it: so no foot crosses or turns towards the other.
-Footstep NextFootstep(const Footstep& stance, Foot foot, const WalkCommand& command, double period,
+Foothold NextFootstep(const Foothold& stance, Foot foot, const WalkCommand& command, double period,
                       const FootstepLimits& limits);
 
 /// A step of a walk that goes on as it is commanded; m, world.
 struct Stride {
-  Footstep next;  ///< where the foot comes down
+  Foothold next;  ///< where the foot comes down
   /// From the stance sole to the capture point as the other foot leaves the ground, and from the
   /// next one as that carries.
   Eigen::Vector2d begin = Eigen::Vector2d::Zero(), end = Eigen::Vector2d::Zero();
 };
 /// Each sole carries alone for `period` s, by its middle. Two steps L₁ and L₂ that come again and
 /// again have ξ − p = (e L₁ + L₂)/(e² − 1) as the first begins, e = exp(ω `period`).
-Stride NominalStride(const Footstep& stance, Foot foot, const WalkCommand& command, double period,
+Stride NominalStride(const Foothold& stance, Foot foot, const WalkCommand& command, double period,
                      double frequency, const FootstepLimits& limits);
 
 /// `step`, beside `stance`, moved towards `wanted` by at most `most`, m and rad; the soles do not
 /// touch.
-Footstep Towards(const Footstep& step, const Footstep& wanted, double most, const Footstep& stance,
+Foothold Towards(const Foothold& step, const Foothold& wanted, double most, const Foothold& stance,
                  Foot foot, const FootstepLimits& limits);
 
 /// `command` approached from `from` by at most `speed`, m/s, and `turn`, rad/s.

@@ -13,7 +13,7 @@ constexpr double kLeastHeight = 0.1;  // m, of the COM above the ground: below, 
 }  // namespace
 
 void StepOutput::Archive(StateArchive* archive) {
-  archive->Show(in_contact, transition, progress, foot, com, swing, swing_rotation, searching, cop,
+  archive->Show(in_contact, transition, progress, foot, com, swing, swing_rotation, foot_state, cop,
                 cop_reference);
 }
 
@@ -70,32 +70,6 @@ PointMotion LeadByCop(const StepInput& input, const Quintic::Point& height,
   com.velocity << input.com_velocity.head<2>(), height.velocity;
   com.acceleration << rate * (input.com.head<2>() - cop.head<2>()), height.acceleration;
   return com;
-}
-
-void LetGo(const Eigen::Isometry3d& sole, double share, double pulled, double down, double lowest,
-           StepOutput* output) {
-  PointMotion& swing = output->swing;
-  swing.position +=
-      share * Eigen::Vector3d(1, 1, pulled).cwiseProduct(sole.translation() - swing.position);
-  double& z = swing.position.z();
-  z = std::max(z - down, std::min(z, lowest));
-  swing.velocity -= share * swing.velocity;
-  swing.acceleration.setZero();
-  RotationMotion& turn = output->swing_rotation;
-  turn.rotation = Eigen::Quaterniond(turn.rotation)
-                      .slerp(share, Eigen::Quaterniond(sole.linear()))
-                      .toRotationMatrix();
-  turn.angular_velocity -= share * turn.angular_velocity;
-  turn.angular_acceleration.setZero();
-}
-
-void FollowSwing(const Swing& swing, const SwingSpec& spec, double depth, double time,
-                 StepOutput* output) {
-  const double last = swing.end() + depth / spec.touch_speed;
-  output->swing = swing.At(std::min(time, last));
-  if (time > last) output->swing.velocity.setZero();
-  output->swing_rotation = swing.RotationAt(time);
-  output->searching = time > swing.end();
 }
 
 }  // namespace poise::stepping

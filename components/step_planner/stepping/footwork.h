@@ -1,5 +1,5 @@
-// What every planner of steps does in a tick: sees the robot as a pendulum on its soles, leads the
-// COM by a centre of pressure, feels a foot land.
+// What every planner of steps does in a tick: sees the robot as a pendulum on its soles and leads
+// the COM by a centre of pressure.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,8 +10,10 @@
 #include "components/framework/tick_time.h"
 #include "components/messages/motion.h"
 #include "components/messages/quintic.h"
+#include "components/step_planner/contact/landing.h"
+#include "components/step_planner/stepping/contact_plan.h"
+#include "components/step_planner/stepping/foot_motion.h"
 #include "components/step_planner/stepping/step_choice.h"
-#include "components/step_planner/stepping/swing.h"
 #include "poise/support_plan_t.hpp"
 
 namespace poise::stepping {
@@ -26,8 +28,7 @@ struct StepInput {
   Eigen::Vector3d lean = Eigen::Vector3d::Zero(), turning = Eigen::Vector3d::Zero();
   FootArray<Eigen::Isometry3d> sole{Eigen::Isometry3d::Identity(), Eigen::Isometry3d::Identity()};
   FootArray<double> load{0, 0};  ///< N
-  /// N that a load must be above to be one: of what is observed only; 0 of a measured one.
-  FootArray<double> least_load{0, 0};
+  FootArray<double> load_deviation{0, 0};  ///< N, standard deviation of an observed load; else 0
   FootArray<bool> in_contact{true, true};  ///< of the plan; while no step is under way
   PointMotion free_foot;                   ///< reference of a foot in the air; likewise
   Eigen::Matrix3d free_rotation = Eigen::Matrix3d::Identity();
@@ -50,12 +51,10 @@ enum class StepReason : int8_t {
 
 /// What a planner of steps says of itself.
 struct StepStatus {
-  int8_t stage = support_plan_t::STEPPING_NONE;        ///< STEPPING_*
-  StepReason reason = StepReason::kNone;               ///< of the step under way, or the last
-  Foot foot = Foot::kRight;                            ///< that steps, or last did
-  Eigen::Vector2d foothold = Eigen::Vector2d::Zero();  ///< m, world, of that step
-  /// s, planned, of the foot that is in the air or about to leave; −1: none is.
-  double touch_down = -1;
+  Stage stage = Stage::kStanding;
+  StepReason reason = StepReason::kNone;  ///< of the step under way, or the last
+  bool under_way = false;                 ///< `step` is planned or under way; else it has landed
+  Footstep step;
   double margin = 0;  ///< StepPlan's
 };
 
@@ -68,12 +67,18 @@ struct StepOutput {
   PointMotion com;
   PointMotion swing;
   RotationMotion swing_rotation;
-  bool searching = false;                         ///< below where the ground was expected
+  Landing::State foot_state = Landing::State::kSwing;  ///< of the foot in the air
   Eigen::Vector2d cop = Eigen::Vector2d::Zero();  ///< m, world, that is wanted
   /// m, world, on the ground: the centre of pressure that `com` follows, `cop` less the observed
   /// offset of the pendulum.
   Eigen::Vector3d cop_reference = Eigen::Vector3d::Zero();
 
+  /// The foot's motion in this tick.
+  void Follow(const FootMotion& motion) {
+    swing = motion.reference();
+    swing_rotation = motion.rotation();
+    foot_state = motion.state();
+  }
   void Archive(StateArchive* archive);
 };
 
@@ -130,15 +135,5 @@ Foot FirstFoot(const WalkCommand& command);
 /// follow: they are the COM's own; in z it follows `height`.
 PointMotion LeadByCop(const StepInput& input, const Quintic::Point& height,
                       const Eigen::Vector3d& cop);
-
-/// A foot that has touched is let go: its reference comes by `share` to where the sole stands, in
-/// height by `pulled` of that, and goes `down`, m, on towards `lowest`, m, where it carries too
-/// little. So its task asks for nothing when it becomes a contact of the model.
-void LetGo(const Eigen::Isometry3d& sole, double share, double pulled, double down, double lowest,
-           StepOutput* output);
-
-/// The swing's motion into `output`; below the foothold it ends `depth`, m, deeper.
-void FollowSwing(const Swing& swing, const SwingSpec& spec, double depth, double time,
-                 StepOutput* output);
 
 }  // namespace poise::stepping

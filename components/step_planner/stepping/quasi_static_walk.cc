@@ -12,17 +12,11 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kRiseOver = 0.5;  // share of a swing before which no load is a landing
-// A foot that touches is let go with a time constant of kLetGo of its settling, which counts as
-// kLongestLetGo, s, at most.
-constexpr double kLetGo = 0.25, kLongestLetGo = 0.06;
 constexpr int kHalvings = 40;  // of [0, 1]
 // m that told ground is higher to be an edge that the foot rises over, and the share of the swing
 // in which it only rises then: on unknown ground 0.15 is enough, told ground is an edge for
 // certain.
 constexpr double kEdgeHeight = 0.03, kEdgeWait = 0.25;
-// Share of the press' load that counts as pressed: a sole that lies down rocks between loads.
-constexpr double kPressed = 0.8;
 // Times the unloading's rate, at least and at most: the ramp goes on however far the centre of
 // pressure is, and comes up with it. A foot that carries nothing and is a contact of the model
 // still was dragged off its place.
@@ -44,6 +38,7 @@ constexpr double kBlend = 0.1;  // s in which the centre of pressure goes over t
 QuasiStaticWalk::QuasiStaticWalk(const StepChoice& choice, const QuasiStaticSpec& spec)
     : choice_(choice),
       spec_(spec),
+      foot_(spec.landing),
       height_(spec.height_rate),
       heading_(spec.yaw_rate),
       pressed_(spec.height_rate),
@@ -59,17 +54,35 @@ double RampStart(double share) {
   return low;
 }
 
-void QuasiStaticWalk::Enter(WalkStage stage, double time) {
-  if (stage == WalkStage::kUnloading) unloaded_ = 0;
+void QuasiStaticWalk::Enter(Stage stage, double time) {
+  if (stage == Stage::kUnloading) {
+    unloaded_ = 0;
+    PlanSteps(steps_.first().at, time);
+  }
   stage_ = stage;
   since_ = time;
 }
 
-Footstep QuasiStaticWalk::Next(const Footstep& stance, Foot foot) const {
+void QuasiStaticWalk::PlanSteps(const Foothold& first, double unload) {
+  constexpr int kPlanned = 3;
+  Footstep step{.foot = Other(stance_), .at = first, .unload = unload};
+  steps_.Clear();
+  for (int i = 0; i < kPlanned; ++i) {
+    step.lift_off = step.unload + slower_ * spec_.unload;
+    step.touch_down = step.lift_off + SwingTime();
+    step.load = step.touch_down + spec_.landing.settle + slower_ * spec_.load;
+    steps_.Add(step);
+    step.unload = step.load;
+    step.foot = Other(step.foot);
+    step.at = Next(step.at, step.foot);
+  }
+}
+
+Foothold QuasiStaticWalk::Next(const Foothold& stance, Foot foot) const {
   return NextFootstep(stance, foot, command_, spec_.period(), spec_.step);
 }
 
-Footstep QuasiStaticWalk::NextOnCourse(const Footstep& stance, Foot foot) const {
+Foothold QuasiStaticWalk::NextOnCourse(const Foothold& stance, Foot foot) const {
   return Towards(Next(stance, foot), Next(course_, foot), spec_.most_return, stance, foot,
                  spec_.step);
 }
@@ -95,40 +108,39 @@ bool QuasiStaticWalk::Update(const StepInput& input, const WalkCommand& command)
   const double time = input.time;
   StepState state = Observe(input, active() ? in_contact_ : input.in_contact);
   switch (stage_) {
-    case WalkStage::kStanding:
+    case Stage::kStanding:
       if (!command.stepping || !input.allowed || !(input.in_contact[0] && input.in_contact[1])) {
         time_ = time;
         return false;
       }
       Start(input, state, command);
       break;
-    case WalkStage::kStarting:
-      if (time >= since_ + spec_.start - kTimeTolerance) Enter(WalkStage::kUnloading, time);
+    case Stage::kShifting:
+      if (time >= since_ + spec_.start - kTimeTolerance) Enter(Stage::kUnloading, time);
       break;
-    case WalkStage::kUnloading:
+    case Stage::kUnloading:
       Unload(state, TickPeriod(time - time_));
       if (LiftsOff(state, time)) BeginSwing(input);
       break;
-    case WalkStage::kSwinging:
-      if (swing_.Progress(time) < kRiseOver) {
-        touch_.Reset();
-      } else if (touch_.Update(time, LoadOfSwing(input) > spec_.touch_load, spec_.touch_duration)) {
-        pressed_since_ = time;
-        sole_[Other(stance_)].Touch(input.sole[Other(stance_)]);
-        Enter(WalkStage::kTouching, time);
+    case Stage::kSwinging:
+    case Stage::kTouching: {
+      const Foot foot = Other(stance_);
+      const bool lands = foot_.Update(input, foot, choice_.foot(foot));
+      if (stage_ == Stage::kSwinging && foot_.state() == Landing::State::kTouching) {
+        sole_[foot].Touch(input.sole[foot]);
+        Enter(Stage::kTouching, time);
       }
+      if (lands) Land(input, state, command);
       break;
-    case WalkStage::kTouching:
-      if (Settled(input)) Land(input, state, command);
-      break;
-    case WalkStage::kLoading:
+    }
+    case Stage::kLoading:
       if (time < since_ + slower_ * spec_.load - kTimeTolerance) break;
       moving_since_ = time;
-      Enter(final_ ? WalkStage::kStopping : WalkStage::kUnloading, time);
+      Enter(steps_.empty() ? Stage::kCatching : Stage::kUnloading, time);
       break;
-    case WalkStage::kStopping:
+    case Stage::kCatching:
       if (!AtRest(input, state) || (OnSoftGround() && !command.stepping)) break;
-      Enter(WalkStage::kStanding, time);
+      Enter(Stage::kStanding, time);
       time_ = time;
       return false;
   }
@@ -143,7 +155,6 @@ void QuasiStaticWalk::Start(const StepInput& input, const StepState& state,
   command_ = Approach({}, command, spec_.acceleration * spec_.period(),
                       spec_.turn_acceleration * spec_.period());
   starting_ = true;
-  final_ = false;
   stance_ = Other(FirstFoot(command));
   in_contact_ = {true, true};
   sinks_ = {0, 0};
@@ -156,11 +167,11 @@ void QuasiStaticWalk::Start(const StepInput& input, const StepState& state,
   height_.Begin(input.com_height);
   heading_.Begin(state.yaw);
   course_ = {state.sole[stance_], state.sole_yaw[stance_]};
-  foothold_ = Next(course_, Other(stance_));
+  PlanSteps(Next(course_, Other(stance_)), input.time + spec_.start);
   left_over_.setZero();
   offset_.setZero();
   reckoned_ = state.pendulum.capture_point();
-  Enter(WalkStage::kStarting, input.time);
+  Enter(Stage::kShifting, input.time);
   // From rest to rest above the stance sole.
   const Vector2d now = state.pendulum.capture_point(), above = state.sole[stance_];
   for (int i = 0; i < 2; ++i) {
@@ -173,21 +184,21 @@ void QuasiStaticWalk::BeginSwing(const StepInput& input) {
   const Foot foot = Other(stance_);
   in_contact_[foot] = false;
   starting_ = false;
-  touch_down_ = input.time + SwingTime();
-  search_depth_ = spec_.search_depth + Sunk(input);
+  Footstep& step = steps_.first();
+  step.lift_off = input.time;
+  step.touch_down = input.time + SwingTime();
+  step.load = step.touch_down + spec_.landing.settle + slower_ * spec_.load;
   pressed_.Begin(0);
-  const double ground = GroundAt(input, foothold_);
+  const double ground = GroundAt(input, step.at);
   SwingSpec way = spec_.foot;
   // Up before an edge that it is told of, not against it.
   if (!spec_.ground.empty() && ground > input.sole[foot].translation().z() + kEdgeHeight) {
     way.wait = std::max(way.wait, kEdgeWait);
   }
-  swing_.Begin({.position = input.sole[foot].translation()}, input.sole[foot].linear(),
-               {foothold_.position.x(), foothold_.position.y(), ground},
-               Eigen::AngleAxisd(foothold_.yaw, Vector3d::UnitZ()).toRotationMatrix(), input.time,
-               touch_down_, way);
-  touch_.Reset();
-  Enter(WalkStage::kSwinging, input.time);
+  // It is searched for as deep below where the stance sole stands as below what that met.
+  foot_.LiftOff({.position = input.sole[foot].translation()}, input.sole[foot].linear(), step,
+                ground, ground - Sunk(input), way, input.time);
+  Enter(Stage::kSwinging, input.time);
 }
 
 double QuasiStaticWalk::Sunk(const StepInput& input) const {
@@ -195,7 +206,7 @@ double QuasiStaticWalk::Sunk(const StepInput& input) const {
   return spec_.ground.empty() ? sole_[s].Sunk(input.sole[s]) : 0;
 }
 
-double QuasiStaticWalk::GroundAt(const StepInput& input, const Footstep& foothold) const {
+double QuasiStaticWalk::GroundAt(const StepInput& input, const Foothold& foothold) const {
   const Vector3d stance = input.sole[stance_].translation();
   if (spec_.ground.empty()) return stance.z() + Sunk(input);
   // From sole to sole: what the estimator's height drifts by does not count.
@@ -203,31 +214,8 @@ double QuasiStaticWalk::GroundAt(const StepInput& input, const Footstep& foothol
          spec_.ground.At(stance_, stance.x());
 }
 
-double QuasiStaticWalk::LoadOfSwing(const StepInput& input) const {
-  return input.load[Other(stance_)];
-}
-
 double QuasiStaticWalk::Loaded(const StepInput& input) const {
-  return std::clamp(LoadOfSwing(input) / spec_.press_load, 0.0, 1.0);
-}
-
-double QuasiStaticWalk::Missing(const StepInput& input) const {
-  return std::clamp(1 - LoadOfSwing(input) / spec_.press_load, -1.0, 1.0);
-}
-
-bool QuasiStaticWalk::Settled(const StepInput& input) {
-  // The sole has lain under its load for as long.
-  if (Loaded(input) < kPressed) pressed_since_ = input.time;
-  return input.time >= pressed_since_ + spec_.settle - kTimeTolerance;
-}
-
-void QuasiStaticWalk::LetGo(const StepInput& input) {
-  const Eigen::Isometry3d& sole = input.sole[Other(stance_)];
-  const double period = TickPeriod(input.time - time_);
-  const double share = period / (kLetGo * std::min(spec_.settle, kLongestLetGo) + period);
-  // It goes on downward as far as it carries nothing: a tilted sole, or one that bounced.
-  stepping::LetGo(sole, share, 0, period * Missing(input) * spec_.foot.touch_speed,
-                  swing_.foothold().z() - search_depth_, &output_);
+  return std::clamp(input.load[Other(stance_)] / spec_.landing.press_load, 0.0, 1.0);
 }
 
 void QuasiStaticWalk::Land(const StepInput& input, const StepState& state,
@@ -240,73 +228,42 @@ void QuasiStaticWalk::Land(const StepInput& input, const StepState& state,
                spec_.most_sinking);
   const double haste = spec_.sink_speed * (spec_.load + spec_.unload);
   slower_ = sinks_[foot] > haste ? sinks_[foot] / haste : 1;
-  course_ = Next(course_, Other(stance_));
-  stance_ = Other(stance_);
-  double_since_ = input.time;
-  Enter(WalkStage::kLoading, input.time);
+  course_ = Next(course_, foot);
+  stance_ = foot;
+  steps_.Land(input.time, input.time + slower_ * spec_.load);
+  Enter(Stage::kLoading, input.time);
   command_ = Approach(command_, command, spec_.acceleration * spec_.period(),
                       spec_.turn_acceleration * spec_.period());
-  // It stops as it stands: beside a foot on unknown ground, or on stairs, may be an edge.
-  final_ = !command_.stepping;
-  foothold_ = NextOnCourse({state.sole[stance_], state.sole_yaw[stance_]}, Other(stance_));
+  if (command_.stepping) {
+    PlanSteps(NextOnCourse({state.sole[stance_], state.sole_yaw[stance_]}, Other(stance_)),
+              steps_.landed().load);
+  } else {
+    // It stops as it stands: beside a foot on unknown ground, or on stairs, may be an edge.
+    steps_.Clear();
+  }
 }
 
-int QuasiStaticWalk::Planned(std::array<PlannedStep, kPlannedSteps>* steps) const {
-  if (!active() || final_) return 0;
-  double due = touch_down_;  // of a foot that swings
-  switch (stage_) {
-    case WalkStage::kStarting:
-      due = since_ + spec_.start + spec_.unload + spec_.swing;
-      break;
-    case WalkStage::kUnloading:
-      due = since_ + spec_.unload + spec_.swing;
-      break;
-    case WalkStage::kLoading:
-      due = since_ + spec_.load + spec_.unload + spec_.swing;
-      break;
-    default:
-      break;
-  }
-  Footstep next = foothold_;
-  Foot foot = stepping_foot();
-  int count = 0;
-  for (PlannedStep& step : *steps) {
-    step = {next, foot, due + count * spec_.period()};
-    ++count;
-    foot = Other(foot);
-    next = Next(next, foot);
-  }
-  return count;
-}
-
-StepStatus QuasiStaticWalk::status(const FootArray<Eigen::Isometry3d>& sole) const {
-  constexpr std::array<int8_t, 7> kStages{
-      support_plan_t::STEPPING_NONE,      support_plan_t::STEPPING_UNLOADING,
-      support_plan_t::STEPPING_UNLOADING, support_plan_t::STEPPING_SWINGING,
-      support_plan_t::STEPPING_SWINGING,  support_plan_t::STEPPING_LOADING,
-      support_plan_t::STEPPING_CATCHING};
-  StepStatus status{.stage = kStages[static_cast<size_t>(stage_)], .reason = StepReason::kWalk};
-  const bool landed = stage_ == WalkStage::kLoading || stage_ == WalkStage::kStopping;
-  status.foot = landed ? stance_ : Other(stance_);
-  status.foothold =
-      landed ? Vector2d(sole[status.foot].translation().head<2>()) : foothold_.position;
-  if (stage_ == WalkStage::kSwinging) status.touch_down = touch_down_;
-  return status;
+StepStatus QuasiStaticWalk::status() const {
+  const bool landed = steps_.empty() || stage_ == Stage::kLoading;
+  return {.stage = stage_,
+          .reason = StepReason::kWalk,
+          .under_way = !landed,
+          .step = landed ? steps_.landed() : steps_.first()};
 }
 
 double QuasiStaticWalk::HighestForStep(const StepInput& input, const StepState& state) const {
-  const bool steps = stage_ == WalkStage::kUnloading || OnOneFoot();
+  const bool steps = stage_ == Stage::kUnloading || OnOneFoot();
   if (!steps) return std::numeric_limits<double>::infinity();
   const Foot s = stance_;
   FootArray<Vector2d> offset{Vector2d::Zero(), Vector2d::Zero()};
-  offset[Other(s)] = Eigen::Rotation2Dd(-state.yaw) * (foothold_.position - state.sole[s]);
+  offset[Other(s)] = Eigen::Rotation2Dd(-state.yaw) * (steps_.first().at.position - state.sole[s]);
   const double share = std::min(choice_.reach().LoweringShare(offset), 1.0);
-  return GroundAt(input, foothold_) + standing_height_ - share * choice_.reach().lowering();
+  return GroundAt(input, steps_.first().at) + standing_height_ - share * choice_.reach().lowering();
 }
 
 double QuasiStaticWalk::Progress(double time) const {
   const double past = time - since_;
-  if (stage_ == WalkStage::kUnloading) return unloaded_;
+  if (stage_ == Stage::kUnloading) return unloaded_;
   // From what the press carries.
   return std::clamp(ramp_start_ + (1 - ramp_start_) * past / (slower_ * spec_.load), 0.0, 1.0);
 }
@@ -329,11 +286,11 @@ balance::ConvexPolygon QuasiStaticWalk::Carrying(const StepInput& input, const S
   const balance::ConvexPolygon sole = choice_.Sole(state, s);
   if (OnOneFoot()) return sole;
   const balance::ConvexPolygon other = choice_.Sole(state, o);
-  if (stage_ == WalkStage::kStarting || stage_ == WalkStage::kStopping) return HullOf(sole, other);
+  if (stage_ == Stage::kShifting || stage_ == Stage::kCatching) return HullOf(sole, other);
   // Free of the ramp the load goes to the feet as the centre of pressure lies between them.
   const Vector2d way = state.sole[s] - state.sole[o];
   const double free = std::clamp((cop - state.sole[o]).dot(way) / way.squaredNorm(), 0.0, 1.0);
-  const bool loading = stage_ == WalkStage::kLoading;
+  const bool loading = stage_ == Stage::kLoading;
   const double ramp = balance::SmoothStep(Progress(input.time));
   const double share = loading ? ramp * free : free + ramp * (1 - free);
   // Corner for corner: all of the sum of two equal soles, a part of it where one is turned.
@@ -363,9 +320,9 @@ Vector2d QuasiStaticWalk::WantedCop(const StepState& state, double time) {
     wanted_ = stance + pressed * (other - stance);
     return wanted_ - pressing / w * (other - stance);
   }
-  const Vector2d way = (final_ ? Vector2d(0.5 * (stance + other)) : stance) - other;
+  const Vector2d way = (steps_.empty() ? Vector2d(0.5 * (stance + other)) : stance) - other;
   // Minimum jerk, p = ξ − ξ̇/ω: towards the outer edge at first, never beyond the next middle.
-  const balance::MinimumJerk gone(time - double_since_, Transfer());
+  const balance::MinimumJerk gone(time - steps_.landed().touch_down, Transfer());
   const double share = pressed + (1 - pressed) * gone.position;
   const double rate = pressing * (1 - gone.position) + (1 - pressed) * gone.speed;
   wanted_ = other + share * way;
@@ -379,7 +336,7 @@ Vector2d QuasiStaticWalk::DesiredCop(const StepInput& input, const StepState& st
   const balance::ConvexPolygon carrying = Carrying(input, state, cop);
   const Vector2d asked = balance::NearestPoint(carrying, cop + (1 + spec_.gain) * error);
   // A foot that lands at another time than planned makes no step of it.
-  if (since_ == time && stage_ != WalkStage::kStarting) left_over_ = output_.cop - asked;
+  if (since_ == time && stage_ != Stage::kShifting) left_over_ = output_.cop - asked;
   const double left = 1 - balance::SmoothStep((time - since_) / kBlend);
   return balance::NearestPoint(carrying, asked + left * left_over_);
 }
@@ -415,7 +372,7 @@ double QuasiStaticWalk::StillSinks(const StepInput& input) {
   // A sole that stands on one corner sinks farther than one that lies, under the same load: each
   // tick's is an upper bound.
   const double sunk = sole_[s].Sunk(input.sole[s]), load = input.load[s];
-  if (load > spec_.press_load) {
+  if (load > spec_.landing.press_load) {
     sinks_[s] = std::min(sinks_[s], std::max(sunk, ExpectedSinking(sunk, load, spec_.weight)));
   }
   const double left = sinks_[s] * std::clamp(1 - load / spec_.weight, 0.0, 1.0);
@@ -424,14 +381,14 @@ double QuasiStaticWalk::StillSinks(const StepInput& input) {
 
 double QuasiStaticWalk::Height(const StepInput& input, const StepState& state) {
   const Foot s = stance_, o = Other(s);
-  const double lower = stage_ == WalkStage::kStopping ? 0 : spec_.com_lowering;
+  const double lower = stage_ == Stage::kCatching ? 0 : spec_.com_lowering;
   const double stance = input.sole[s].translation().z(), other = input.sole[o].translation().z();
   // Before it sinks: its leg would be stretched.
   const double low = stance - StillSinks(input);
-  const bool feels = stage_ != WalkStage::kSwinging || output_.searching;
+  const bool feels = stage_ != Stage::kSwinging || foot_.state() == Landing::State::kSearching;
   // Above the lower foot: a straight leg reaches no farther down.
   const double height = (feels ? std::min(low, other) : low) + standing_height_ - lower;
-  const bool shifts = stage_ == WalkStage::kLoading || stage_ == WalkStage::kUnloading;
+  const bool shifts = stage_ == Stage::kLoading || stage_ == Stage::kUnloading;
   if (!shifts || !(sinks_[s] > spec_.soft)) return height;
   // While a foot sinks, above the higher one as far as the lower one's leg reaches: the ankle of a
   // leg that is bent above its sole comes to its limit first.
@@ -447,36 +404,30 @@ double QuasiStaticWalk::Height(const StepInput& input, const StepState& state) {
 void QuasiStaticWalk::Lead(const StepInput& input, const StepState& state) {
   const double period = TickPeriod(input.time - time_);
   // A foot that is pressed carries: the sole of the other one shall do so by its middle still.
-  const bool presses = stage_ == WalkStage::kTouching;
-  const double share = stage_ == WalkStage::kSwinging ? 0 : presses ? Loaded(input) : 1;
+  const bool presses = stage_ == Stage::kTouching;
+  const double share = stage_ == Stage::kSwinging ? 0 : presses ? Loaded(input) : 1;
   pressed_.Follow(share * spec_.press_share, period);
   const Foot s = stance_;
   double height = Height(input, state);
   if (!spec_.ground.empty()) height = std::min(height, HighestForStep(input, state));
   height_.Follow(height, period);
-  heading_.Follow(state.sole_yaw[s], OnOneFoot() ? foothold_.yaw : state.sole_yaw[Other(s)],
+  heading_.Follow(state.sole_yaw[s], OnOneFoot() ? steps_.first().at.yaw : state.sole_yaw[Other(s)],
                   period);
   const Vector2d cop = DesiredCop(input, state);
   output_.cop = cop;
   output_.cop_reference << WithoutOffset(state, cop, period), input.sole[s].translation().z();
   output_.com = LeadByCop(input, height_.point(), output_.cop_reference);
   output_.in_contact = in_contact_;
-  output_.searching = false;
-  if (stage_ == WalkStage::kSwinging) {
-    FollowSwing(swing_, spec_.foot, search_depth_, input.time, &output_);
-  } else if (stage_ == WalkStage::kTouching) {
-    LetGo(input);
-  }
-  output_.transition = stage_ == WalkStage::kUnloading ? -1 : stage_ == WalkStage::kLoading ? 1 : 0;
-  output_.foot = stage_ == WalkStage::kLoading ? stance_ : Other(stance_);
+  output_.Follow(foot_);
+  output_.transition = stage_ == Stage::kUnloading ? -1 : stage_ == Stage::kLoading ? 1 : 0;
+  output_.foot = stage_ == Stage::kLoading ? stance_ : Other(stance_);
   output_.progress = output_.transition == 0 ? 0 : Progress(input.time);
 }
 
 void QuasiStaticWalk::Archive(StateArchive* archive) {
-  archive->Show(stage_, command_, stance_, num_steps_, in_contact_, swing_, touch_, height_,
-                heading_, pressed_, sole_, sinks_, slower_, search_depth_, time_, since_,
-                moving_since_, double_since_, touch_down_, standing_height_, starting_, final_,
-                pressed_since_, course_, unloaded_, lowered_, foothold_, start_, wanted_,
+  archive->Show(stage_, command_, stance_, num_steps_, in_contact_, steps_, foot_, height_,
+                heading_, pressed_, sole_, sinks_, slower_, time_, since_, moving_since_,
+                standing_height_, starting_, course_, unloaded_, lowered_, start_, wanted_,
                 left_over_, reckoned_, offset_, output_);
 }
 

@@ -11,7 +11,6 @@
 #include "components/step_planner/stepping/known_ground.h"
 #include "components/step_planner/stepping/pressed_sole.h"
 #include "components/step_planner/stepping/step_choice.h"
-#include "components/step_planner/stepping/swing.h"
 
 namespace poise::stepping {
 
@@ -20,21 +19,18 @@ struct QuasiStaticSpec {
   double start = 0;   ///< s in which the COM leaves the middle for the first stance foot
   double unload = 0;  ///< s of the ramp that unloads a foot
   double swing = 0;   ///< s
-  double settle = 0;  ///< s under the press' load until a foot counts as a contact
   double load = 0;    ///< s of the ramp that loads it again
   FootstepLimits step;
   double acceleration = 0, turn_acceleration = 0;  ///< m/s², rad/s², of what is commanded
   SwingSpec foot;
-  double touch_load = 0, touch_duration = 0;  ///< N, s
-  double search_depth = 0;                    ///< m below the foothold
+  LandingSpec landing;
   double gain = 0;                            ///< of the capture point's error, > 0
   double most_offset = 0;                     ///< m, of the pendulum's observed offset
   double com_lowering = 0;                    ///< m below standing at which it walks
   double height_rate = 0, yaw_rate = 0;  ///< 1/s, with which height and heading of the body follow
   /// The robot is still: m from the soles' middle to the capture point, m/s of the COM, s of both.
   double still_distance = 0, still_speed = 0, still_time = 0;
-  double press_load = 0;         ///< N with which a foot that has touched is pressed down
-  double press_share = 0;        ///< of the weight that this is
+  double press_share = 0;        ///< of the weight, with which a foot that has touched is pressed
   double lift_off_distance = 0;  ///< m from the stance sole's middle to the capture point, at most
   double most_return = 0;        ///< m, rad by which a foothold comes back to the course at most
   KnownGround ground;
@@ -48,17 +44,7 @@ struct QuasiStaticSpec {
   double sink_speed = 1;    ///< m/s of a sole's sinking, on average over the ramps: above 0
 
   /// s from touch-down to touch-down.
-  double period() const { return unload + swing + settle + load; }
-};
-
-enum class WalkStage {
-  kStanding,
-  kStarting,
-  kUnloading,
-  kSwinging,
-  kTouching,
-  kLoading,
-  kStopping
+  double period() const { return unload + swing + landing.settle + load; }
 };
 
 /// Where the ramp (61) has risen to `share`.
@@ -73,13 +59,13 @@ class QuasiStaticWalk {
   /// Once a tick. False: the robot stands, `output` is not to be used.
   bool Update(const StepInput& input, const WalkCommand& command);
   const StepOutput& output() const { return output_; }
-  bool active() const { return stage_ != WalkStage::kStanding; }
-  WalkStage stage() const { return stage_; }
+  bool active() const { return stage_ != Stage::kStanding; }
+  Stage stage() const { return stage_; }
   int num_steps() const { return num_steps_; }  ///< feet that have landed, since the start
   /// Steps begun since the start, the one under way too.
   int num_begun() const {
     const bool under_way =
-        active() && stage_ != WalkStage::kLoading && stage_ != WalkStage::kStopping;
+        active() && stage_ != Stage::kLoading && stage_ != Stage::kCatching;
     return num_steps_ + (under_way ? 1 : 0);
   }
   Foot stepping_foot() const { return Other(stance_); }  ///< that is in the air, or the next to be
@@ -90,21 +76,14 @@ class QuasiStaticWalk {
     time_ = time;
     num_steps_ = num_begun();
     lowered_ = lowered_ || active();
-    stage_ = WalkStage::kStanding;
+    stage_ = Stage::kStanding;
+    steps_.Clear();
   }
-  /// `sole`: m, world; where a landed foot stands.
-  StepStatus status(const FootArray<Eigen::Isometry3d>& sole) const;
-  struct PlannedStep {
-    Footstep at;
-    Foot foot = Foot::kRight;
-    double touch_down = 0;  ///< s, planned
-  };
-  static constexpr int kPlannedSteps = 3;
-  /// The step under way or next, and those that follow if the command stays; how many there are.
-  int Planned(std::array<PlannedStep, kPlannedSteps>* steps) const;
+  StepStatus status() const;
+  /// The step under way or next, and those that follow if the command stays.
+  const ContactPlan& steps() const { return steps_; }
   const StepChoice& choice() const { return choice_; }
-  double period() const { return spec_.period(); }   ///< s from touch-down to touch-down
-  double touch_down() const { return touch_down_; }  ///< s, planned
+  double period() const { return spec_.period(); }  ///< s from touch-down to touch-down
   /// What is walked now: the command, approached without haste.
   const WalkCommand& command() const { return command_; }
   /// rad, rad/s, rad/s² about the vertical, of the body since it stood.
@@ -114,24 +93,16 @@ class QuasiStaticWalk {
   void Archive(StateArchive* archive);
 
  private:
-  void Enter(WalkStage stage, double time);
+  void Enter(Stage stage, double time);
   void Start(const StepInput& input, const StepState& state, const WalkCommand& command);
   void BeginSwing(const StepInput& input);
-  /// The foot is let go: its reference comes to where the sole stands, so that its task asks for
-  /// nothing when it becomes a contact, and the torque goes on without a step.
-  void LetGo(const StepInput& input);
-  /// N on the foot that swings.
-  double LoadOfSwing(const StepInput& input) const;
   /// Share of the press' load on the foot that comes down, at most 1.
   double Loaded(const StepInput& input) const;
-  /// What is missing of the press' load, as a share of it, −1 to 1.
-  double Missing(const StepInput& input) const;
-  bool Settled(const StepInput& input);
   /// m, by which the stance sole has sunk into unknown ground.
   double Sunk(const StepInput& input) const;
   /// m, world: what is told of the ground, or where the stance sole met it, from where the other
   /// sole stands.
-  double GroundAt(const StepInput& input, const Footstep& foothold) const;
+  double GroundAt(const StepInput& input, const Foothold& foothold) const;
   /// m, world: the highest COM from which the foot reaches down to the foothold that it is told of.
   double HighestForStep(const StepInput& input, const StepState& state) const;
   /// How far the ramp that is under way has come, 0 to 1.
@@ -140,12 +111,14 @@ class QuasiStaticWalk {
   void Unload(const StepState& state, double period);
   void Land(const StepInput& input, const StepState& state, const WalkCommand& command);
   bool OnOneFoot() const {
-    return stage_ == WalkStage::kSwinging || stage_ == WalkStage::kTouching;
+    return stage_ == Stage::kSwinging || stage_ == Stage::kTouching;
   }
   bool AtRest(const StepInput& input, const StepState& state);
-  Footstep Next(const Footstep& stance, Foot foot) const;
+  /// The steps to come: the next one is to `first`, its foot is unloaded from `unload` on, s.
+  void PlanSteps(const Foothold& first, double unload);
+  Foothold Next(const Foothold& stance, Foot foot) const;
   /// Next, brought back to the commanded course.
-  Footstep NextOnCourse(const Footstep& stance, Foot foot) const;
+  Foothold NextOnCourse(const Foothold& stance, Foot foot) const;
   /// The foot may leave the ground.
   bool LiftsOff(const StepState& state, double time) const;
   double Transfer() const { return slower_ * (spec_.load + spec_.unload); }  ///< s
@@ -173,31 +146,26 @@ class QuasiStaticWalk {
 
   StepChoice choice_;
   QuasiStaticSpec spec_;
-  WalkStage stage_ = WalkStage::kStanding;
+  Stage stage_ = Stage::kStanding;
   WalkCommand command_;
   Foot stance_ = Foot::kRight;
   int num_steps_ = 0;
   FootArray<bool> in_contact_{true, true};
-  Swing swing_;
-  LastingCondition touch_;
+  ContactPlan steps_;  // empty: no step follows the one that has landed
+  FootMotion foot_;
   HeightLead height_;
   BodyHeading heading_;
   HeightLead pressed_;                              // share that the press carries
   double time_ = 0, since_ = 0, moving_since_ = 0;  // s: last tick; stage; not at rest
-  double double_since_ = 0, touch_down_ = 0;        // s: both feet down; a touch, planned
-  double pressed_since_ = 0;                        // s: pressed down
   FootArray<PressedSole> sole_;
   FootArray<double> sinks_{0, 0};  // m, expected of each sole under the weight
-  double search_depth_ = 0;        // m, below the foothold: as deep as the stance sole's ground
   double slower_ = 1;              // ratio: the ramps, where the sole sinks
   double unloaded_ = 0;            // of the unloading ramp
   double ramp_start_ = 0;          // of the loading ramp: what the press carries
   double standing_height_ = 0;     // m
   bool lowered_ = false;           // stopped while it walked: it has not stood up since
   bool starting_ = false;          // no foot has left the ground yet
-  bool final_ = false;             // no step follows the one that has landed
-  Footstep foothold_;
-  Footstep course_;  // where the stance sole would stand if every step came down as commanded
+  Foothold course_;  // where the stance sole would stand if every step came down as commanded
   std::array<Quintic, 2> start_;                         // of the capture point while starting
   Eigen::Vector2d wanted_ = Eigen::Vector2d::Zero();     // m
   Eigen::Vector2d reckoned_ = Eigen::Vector2d::Zero();   // m, capture point by the pendulum

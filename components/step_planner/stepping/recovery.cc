@@ -34,11 +34,6 @@ constexpr double kStillDistance = 0.03, kStillSpeed = 0.06, kStillTime = 0.3;
 // s after which a COM that stands still beside the middle is at rest, too: friction of the joints
 // holds it there.
 constexpr double kStillBesideTime = 1;
-// Share of a swing before which a load is the ground that the foot leaves, or a tap on the way up.
-constexpr double kLeastProgress = 0.5;
-// m above the ground of a sole's lowest corner, from which on an observed load is no landing before
-// it is time: a leg that brakes its swing is observed as a load.
-constexpr double kLowSole = 0.015;
 // Feet are put side by side without haste, as no fall is to be caught.
 constexpr double kTogetherShift = 1.5;  // s in which the COM goes above the foot that stays
 constexpr double kMostShifts = 2.5;     // times that, after which it is given up
@@ -69,7 +64,7 @@ bool Recovery::Update(const StepInput& input) {
   command_ = Approach(command_, input.command, period * spec_.acceleration,
                       period * spec_.turn_acceleration);
   switch (stage_) {
-    case Stage::kIdle: {
+    case Stage::kStanding: {
       turns_ = false;
       const StepReason need = NeedOfFirstStep(input, state, excess);
       if (need == StepReason::kNone && command_.stepping && input.allowed && input.in_contact[0] &&
@@ -85,7 +80,7 @@ bool Recovery::Update(const StepInput& input) {
         BeginShift(input, state);
       }
       step_helps_ = true;
-      if (spec_.watched_margin >= 0 && stage_ == Stage::kIdle && excess > -spec_.watched_margin) {
+      if (spec_.watched_margin >= 0 && stage_ == Stage::kStanding && excess > -spec_.watched_margin) {
         const StepPlan plan = choice_.Choose(state);
         step_helps_ = plan.possible && choice_.Helps(state, plan);
       }
@@ -103,14 +98,16 @@ bool Recovery::Update(const StepInput& input) {
       Shift(input, state, excess);
       break;
     case Stage::kUnloading:
-      if (time >= since_ + UnloadTime() - kTimeTolerance) LiftOff(input);
+      if (time >= steps_.first().lift_off - kTimeTolerance) LiftOff(input);
       break;
     case Stage::kSwinging:
-      if (Touches(input)) Land(input);
+      if (foot_.Update(input, plan_.foot, choice_.foot(plan_.foot))) Land(input);
+      break;
+    case Stage::kTouching:  // the first load counts
       break;
     case Stage::kLoading:
       if (StepOn(input, state)) break;
-      if (time >= since_ + LoadTime() - kTimeTolerance) {
+      if (time >= steps_.landed().load - kTimeTolerance) {
         stage_ = Stage::kCatching;
         since_ = moving_since_ = time;
       }
@@ -129,7 +126,7 @@ bool Recovery::Update(const StepInput& input) {
       } else if (stays_outside_ && steps_now_ < kMostSteps) {
         BeginStep(input, choice_.Choose(state), StepReason::kAgain);
       } else if (AtRest(input, state)) {
-        stage_ = Stage::kIdle;
+        stage_ = Stage::kStanding;
         const bool caught = reason_ != StepReason::kTogether;
         if (caught && spec_.together_after > 0) together_at_ = time + spec_.together_after;
         // A walk ends with the feet side by side.
@@ -137,18 +134,18 @@ bool Recovery::Update(const StepInput& input) {
       }
       break;
   }
-  if (stage_ == Stage::kIdle) {
+  if (stage_ == Stage::kStanding) {
     time_ = time;
     return false;
   }
   state.in_contact = in_contact_;
-  Swings(input, state);
+  Replan(input, state);
   LeadCom(input, state);
+  output_.Follow(foot_);
   output_.in_contact = in_contact_;
   output_.foot = plan_.foot;
   output_.transition = stage_ == Stage::kUnloading ? -1 : stage_ == Stage::kLoading ? 1 : 0;
-  const double ramp = stage_ == Stage::kUnloading ? UnloadTime() : LoadTime();
-  output_.progress = output_.transition == 0 ? 0 : std::clamp((time - since_) / ramp, 0.0, 1.0);
+  output_.progress = output_.transition == 0 ? 0 : std::clamp(Ramp(time), 0.0, 1.0);
   time_ = time;
   return true;
 }
@@ -166,13 +163,8 @@ StepReason Recovery::NeedOfFirstStep(const StepInput& input, const StepState& st
 }
 
 StepStatus Recovery::status() const {
-  constexpr std::array<int8_t, 6> kStages{
-      support_plan_t::STEPPING_NONE,      support_plan_t::STEPPING_CATCHING,
-      support_plan_t::STEPPING_UNLOADING, support_plan_t::STEPPING_SWINGING,
-      support_plan_t::STEPPING_LOADING,   support_plan_t::STEPPING_CATCHING};
-  const bool under_way = stage_ == Stage::kUnloading || stage_ == Stage::kSwinging;
-  return {kStages[static_cast<size_t>(stage_)], reason_,     plan_.foot, plan_.foothold,
-          under_way ? touch_down_ : -1,         plan_.margin};
+  const bool under_way = !steps_.empty();
+  return {stage_, reason_, under_way, under_way ? steps_.first() : steps_.landed(), plan_.margin};
 }
 
 double Recovery::UnloadTime() const {
@@ -239,68 +231,54 @@ void Recovery::Shift(const StepInput& input, const StepState& state, double exce
 
 bool Recovery::BeginStep(const StepInput& input, const StepPlan& plan, StepReason reason) {
   if (!plan.possible || !std::isfinite(plan.margin)) return false;
-  plan_ = plan;
   reason_ = reason;
   ++num_steps_;
   ++steps_now_;
   since_ = input.time;
-  touch_down_ = input.time + plan.time;
   cop_from_ = output_.cop;
   ramp_from_ = 0;
   stage_ = Stage::kUnloading;
-  if (!in_contact_[plan.foot]) {
-    const Vector2d sole = plan.foothold;
-    const double ground = input.sole[Other(plan.foot)].translation().z();
-    swing_.Begin(input.free_foot, input.free_rotation, {sole.x(), sole.y(), ground},
-                 Eigen::AngleAxisd(plan.yaw, Vector3d::UnitZ()).toRotationMatrix(), input.time,
-                 touch_down_, spec_.swing);
-    stage_ = Stage::kSwinging;
-    if (plan.around) swing_.GoAround(plan.corner);
-  }
-  return true;
+  Footstep step;
+  step.foot = plan.foot;
+  step.unload = input.time;
+  step.lift_off = input.time + UnloadTime();
+  step.touch_down = input.time + plan.time;
+  step.load = step.touch_down + LoadTime();
+  steps_.Clear();
+  steps_.Add(step);
+  SetPlan(plan);
+  return in_contact_[plan.foot] || LiftOff(input, input.free_foot, input.free_rotation);
+}
+
+void Recovery::SetPlan(const StepPlan& plan) {
+  plan_ = plan;
+  Footstep& step = steps_.first();
+  step.at = {plan.foothold, plan.yaw};
+  step.around = plan.around;
+  step.corner = plan.corner;
 }
 
 bool Recovery::LiftOff(const StepInput& input) {
-  const Foot foot = plan_.foot;
-  in_contact_[foot] = false;
-  const Eigen::Isometry3d& sole = input.sole[foot];
-  const double ground = input.sole[Other(foot)].translation().z();
-  swing_.Begin({.position = sole.translation()}, sole.linear(),
-               {plan_.foothold.x(), plan_.foothold.y(), ground},
-               Eigen::AngleAxisd(plan_.yaw, Vector3d::UnitZ()).toRotationMatrix(), input.time,
-               touch_down_, spec_.swing);
-  if (plan_.around) swing_.GoAround(plan_.corner);
+  const Eigen::Isometry3d& sole = input.sole[plan_.foot];
+  return LiftOff(input, {.position = sole.translation()}, sole.linear());
+}
+
+bool Recovery::LiftOff(const StepInput& input, const PointMotion& from,
+                       const Eigen::Matrix3d& rotation) {
+  in_contact_[plan_.foot] = false;
+  steps_.first().lift_off = input.time;
+  const double ground = input.sole[Other(plan_.foot)].translation().z();
+  foot_.LiftOff(from, rotation, steps_.first(), ground, ground, spec_.swing, input.time);
   stage_ = Stage::kSwinging;
   since_ = input.time;
   cop_from_ = output_.cop;
   return true;
 }
 
-double Recovery::TouchLoad(const StepInput& input) const {
-  const double least = input.least_load[plan_.foot];
-  return std::max(spec_.touch_load, least > 0 ? std::max(least, spec_.observed_load) : 0);
-}
-
-bool Recovery::Touches(const StepInput& input) const {
-  if (swing_.Progress(input.time) < kLeastProgress) return false;
-  // The first load counts: the foot bounces, and six milliseconds of steady load came 0.12 s late.
-  if (!(input.load[plan_.foot] > TouchLoad(input))) return false;
-  return !(input.least_load[plan_.foot] > 0) || input.time >= touch_down_ || IsLow(input);
-}
-
-bool Recovery::IsLow(const StepInput& input) const {
-  const Eigen::Isometry3d& sole = input.sole[plan_.foot];
-  const balance::ConvexPolygon outline = SoleAt(choice_.foot(plan_.foot), 0, Vector2d::Zero(), 0);
-  double lowest = 0;
-  for (const Vector2d& corner : outline.corners()) {
-    lowest = std::min(lowest, sole.linear().row(2).head<2>().dot(corner));
-  }
-  return sole.translation().z() + lowest < swing_.foothold().z() + kLowSole;
-}
-
 void Recovery::Land(const StepInput& input) {
   in_contact_[plan_.foot] = true;
   CountStride(input);
+  steps_.Land(input.time, input.time + LoadTime());
   stage_ = Stage::kLoading;
   since_ = input.time;
   cop_from_ = output_.cop;
@@ -325,47 +303,45 @@ bool Recovery::StepOn(const StepInput& input, const StepState& state) {
   return BeginStep(input, next, StepReason::kAgain) && LiftOff(input);
 }
 
-void Recovery::Swings(const StepInput& input, const StepState& state) {
-  output_.searching = false;
+void Recovery::Replan(const StepInput& input, const StepState& state) {
   if (stage_ != Stage::kUnloading && stage_ != Stage::kSwinging) return;
+  const bool swings = stage_ == Stage::kSwinging;
   // A push takes over a foot that is under way to the other's side.
   if (reason_ == StepReason::kTogether) {
-    if (!(Excess(state) > kLeastExcess)) {
-      if (stage_ == Stage::kSwinging) {
-        FollowSwing(swing_, spec_.swing, spec_.search_depth, input.time, &output_);
-      }
-      return;
-    }
+    if (!(Excess(state) > kLeastExcess)) return;
     Hurry(state, input.time);
   }
-  const double left = touch_down_ - input.time;
-  if (left > spec_.swing.freeze && reason_ == StepReason::kWalk) {
-    const StepPlan next = choice_.StrideAt(state, plan_.foot, gait(state), left);
-    if (std::isfinite(next.margin)) plan_ = next;
-    if (stage_ == Stage::kSwinging) swing_.Move(plan_.foothold, input.time, touch_down_);
-  } else if (left > spec_.swing.freeze) {
-    const bool around = stage_ == Stage::kSwinging && swing_.around();
-    const StepPlan next = choice_.At(state, plan_.foot, left, plan_.crossing);
-    // A foothold that the way under way does not lead to is none.
-    if (std::isfinite(next.margin) && (stage_ == Stage::kUnloading || around || !next.around)) {
-      plan_ = next;
-    }
-    if (stage_ == Stage::kSwinging) swing_.Move(plan_.foothold, input.time, touch_down_);
-  }
-  if (stage_ == Stage::kSwinging) {
-    FollowSwing(swing_, spec_.swing, spec_.search_depth, input.time, &output_);
-  }
+  const double left = steps_.first().touch_down - input.time;
+  if (!(left > spec_.swing.freeze)) return;
+  const bool walks = reason_ == StepReason::kWalk;
+  const StepPlan next = walks ? choice_.StrideAt(state, plan_.foot, gait(state), left)
+                              : choice_.At(state, plan_.foot, left, plan_.crossing);
+  // A foothold that the way under way does not lead to is none.
+  const bool leads = walks || !swings || foot_.swing().around() || !next.around;
+  if (std::isfinite(next.margin) && leads) SetPlan(next);
+  if (swings) foot_.Move(steps_.first(), input.time);
 }
 
 void Recovery::Hurry(const StepState& state, double time) {
-  const double share = std::clamp((time - since_) / UnloadTime(), 0.0, 1.0);
   reason_ = StepReason::kAgain;
   if (stage_ != Stage::kUnloading) return;
-  since_ = time - share * UnloadTime();
+  const double share = std::clamp(Ramp(time), 0.0, 1.0);
+  Footstep& step = steps_.first();
+  step.unload = time - share * UnloadTime();
+  step.lift_off = step.unload + UnloadTime();
   ramp_from_ = share;
   cop_from_ = output_.cop;
   const StepPlan next = choice_.Plan(state, plan_.foot, plan_.crossing);
-  touch_down_ = std::min(touch_down_, time + next.time - share * UnloadTime());
+  step.touch_down = std::min(step.touch_down, time + next.time - share * UnloadTime());
+}
+
+double Recovery::Ramp(double time) const {
+  if (stage_ == Stage::kUnloading) {
+    const Footstep& step = steps_.first();
+    return (time - step.unload) / (step.lift_off - step.unload);
+  }
+  const Footstep& step = steps_.landed();
+  return (time - step.touch_down) / (step.load - step.touch_down);
 }
 
 Vector2d Recovery::Goal(const StepState& state) const {
@@ -400,7 +376,7 @@ Vector2d Recovery::BrakingPoint(const StepInput& input, const StepState& state) 
   }
   if (reason_ == StepReason::kWalk) {
     return WalkingPoint(input, state, stance, sole,
-                        touch_down_ + gait(state).transfer - input.time);
+                        steps_.first().touch_down + gait(state).transfer - input.time);
   }
   const Vector2d body = ForBody(input, kSwingBudget);
   return balance::NearestPoint(sole, state.pendulum.capture_point() + body) - body;
@@ -475,16 +451,17 @@ void Recovery::LeadCom(const StepInput& input, const StepState& state) {
     case Stage::kSwinging:
       cop = BrakingPoint(input, state);
       if (stage_ == Stage::kUnloading) {
-        share = ((input.time - since_) / UnloadTime() - ramp_from_) / (1 - ramp_from_);
+        share = (Ramp(input.time) - ramp_from_) / (1 - ramp_from_);
       }
       break;
     case Stage::kShifting:
     case Stage::kLoading:
     case Stage::kCatching:
       cop = CatchingPoint(input, state);
-      if (stage_ == Stage::kLoading) share = (input.time - since_) / LoadTime();
+      if (stage_ == Stage::kLoading) share = Ramp(input.time);
       break;
-    case Stage::kIdle:
+    case Stage::kStanding:
+    case Stage::kTouching:
       break;
   }
   share = balance::SmoothStep(share);
@@ -495,8 +472,8 @@ void Recovery::LeadCom(const StepInput& input, const StepState& state) {
 }
 
 void Recovery::Archive(StateArchive* archive) {
-  archive->Show(stage_, reason_, num_steps_, steps_now_, in_contact_, plan_, swing_, height_,
-                outside_, near_edge_, time_, since_, ramp_from_, touch_down_, stays_outside_,
+  archive->Show(stage_, reason_, num_steps_, steps_now_, in_contact_, plan_, steps_, foot_, height_,
+                outside_, near_edge_, time_, since_, ramp_from_, stays_outside_,
                 stays_near_edge_, excess_at_edge_, moving_since_, cop_from_, standing_height_,
                 together_asked_, together_at_, shift_from_, step_helps_, command_, turns_, heading_,
                 stride_, output_);

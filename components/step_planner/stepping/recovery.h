@@ -9,7 +9,6 @@
 #include "components/step_planner/stepping/footwork.h"
 #include "components/step_planner/stepping/step_choice.h"
 #include "components/step_planner/stepping/stride_correction.h"
-#include "components/step_planner/stepping/swing.h"
 
 namespace poise::stepping {
 
@@ -17,9 +16,7 @@ namespace poise::stepping {
 struct RecoverySpec {
   double load = 0;  ///< s of the ramp that loads a landed foot
   SwingSpec swing;
-  double touch_load = 0;     ///< N
-  double observed_load = 0;  ///< N, in place of `touch_load` where loads are observed
-  double search_depth = 0;   ///< m below the foothold
+  LandingSpec landing;
   double gain = 0;           ///< of the capture point's error in the centre of pressure, > 0
   /// m·s²: the inertia with which the body turns, soles and COM at rest, over the robot's weight.
   double turn_share = 0;
@@ -38,21 +35,23 @@ struct RecoverySpec {
   double yaw_rate = 0;  ///< 1/s, with which the body's heading follows the feet's
 };
 
-enum class Stage { kIdle, kShifting, kUnloading, kSwinging, kLoading, kCatching };
-
 /// Pure function of its calls; never allocates.
 class Recovery {
  public:
   Recovery() = default;
   Recovery(const StepChoice& choice, const RecoverySpec& spec)
-      : choice_(choice), spec_(spec), height_(spec.height_rate), heading_(spec.yaw_rate) {}
+      : choice_(choice),
+        spec_(spec),
+        foot_(spec.landing),
+        height_(spec.height_rate),
+        heading_(spec.yaw_rate) {}
 
   /// Once a tick. False: idle, `output` is not to be used.
   bool Update(const StepInput& input);
   /// The feet side by side, once the robot rests on both; no effect where they are.
   void BringTogether() { together_asked_ = true; }
   const StepOutput& output() const { return output_; }
-  bool active() const { return stage_ != Stage::kIdle; }
+  bool active() const { return stage_ != Stage::kStanding; }
   /// A step is under way, or one would help: false only within `watched_margin` of the soles' edge,
   /// or beyond it, where none does and another strategy may have the centre of pressure.
   bool would_step() const { return active() || step_helps_; }
@@ -60,8 +59,7 @@ class Recovery {
   StepReason reason() const { return reason_; }
   int num_steps() const { return num_steps_; }  ///< since the start
   StepStatus status() const;
-  const StepPlan& plan() const { return plan_; }     ///< of the step under way
-  double touch_down() const { return touch_down_; }  ///< s, planned, of the step under way
+  const ContactPlan& steps() const { return steps_; }
   const StepChoice& choice() const { return choice_; }
   /// What is walked now: the command, approached without haste.
   const WalkCommand& command() const { return command_; }
@@ -79,16 +77,12 @@ class Recovery {
   StepReason NeedOfFirstStep(const StepInput& input, const StepState& state, double excess);
   /// False, and no effect: no foot can make this step.
   bool BeginStep(const StepInput& input, const StepPlan& plan, StepReason reason);
-  /// True: the plan's foot has left the ground.
+  /// True: the plan's foot leaves, from the motion `from` and turned by `rotation`, or from where
+  /// its sole stands.
+  bool LiftOff(const StepInput& input, const PointMotion& from, const Eigen::Matrix3d& rotation);
   bool LiftOff(const StepInput& input);
-  /// The foothold where the capture point now says, and the foot on its way there.
-  void Swings(const StepInput& input, const StepState& state);
-  /// The foot that swings has met the ground, and is a contact of the model from now on.
-  bool Touches(const StepInput& input) const;
-  /// A corner of the swinging sole is near the ground.
-  bool IsLow(const StepInput& input) const;
-  /// N on it that are a touch.
-  double TouchLoad(const StepInput& input) const;
+  /// The foothold where the capture point now says.
+  void Replan(const StepInput& input, const StepState& state);
   void Land(const StepInput& input);
   /// The other foot leaves as soon as the one that has landed carries more, until the capture point
   /// is well inside the soles. True: it does.
@@ -130,6 +124,10 @@ class Recovery {
                            const Eigen::Vector2d& velocity, double budget) const;
   double UnloadTime() const;
   double LoadTime() const;
+  /// Share of the ramp under way, unloading or loading, that has passed at `time`, s.
+  double Ramp(double time) const;
+  /// The first step goes where `plan` says.
+  void SetPlan(const StepPlan& plan);
   /// A push while the feet are put side by side: the step catches it from now on. A foot that is
   /// being unloaded goes on from the load that it has, faster, and comes down as soon as it can.
   void Hurry(const StepState& state, double time);
@@ -146,15 +144,15 @@ class Recovery {
 
   StepChoice choice_;
   RecoverySpec spec_;
-  Stage stage_ = Stage::kIdle;
+  Stage stage_ = Stage::kStanding;
   StepReason reason_ = StepReason::kNone;
   int num_steps_ = 0, steps_now_ = 0;
   FootArray<bool> in_contact_{true, true};
-  StepPlan plan_;
-  Swing swing_;
+  StepPlan plan_;  // of the first step, or of the last one that has landed
+  ContactPlan steps_;
+  FootMotion foot_;
   double time_ = 0, since_ = 0;  // s, last tick; when the stage began
   double ramp_from_ = 0;         // share of the unloading ramp where `cop_from_` was asked for
-  double touch_down_ = 0;        // s
   // The capture point is beyond the soles, and near their edge or beyond.
   LastingCondition outside_, near_edge_;
   bool stays_outside_ = false, stays_near_edge_ = false;  // for as long as a step asks for

@@ -16,7 +16,7 @@ class ContactLossTest : public testing::Test {
     return loss_.lost();
   }
 
-  ContactLoss loss_{ContactConfirmation()};  // below 4 N for 0.1 s
+  ContactLoss loss_{4};  // below 4 N for 0.1 s
   int tick_ = 0;
 };
 

@@ -30,11 +30,11 @@ TEST(Footsteps, AStrideThatIsGivenIsWalkedAsFarAsLegsReach) {
   WalkCommand command{.stepping = true, .period = 0.4};
   command.stride[Foot::kRight] = {{0.1, -0.2}, -0.1};
   command.stride[Foot::kLeft] = {{0.5, 0.1}, 1};
-  const Footstep stance{{1, 2}, std::numbers::pi / 2};  // ahead is y, left is −x
-  const Footstep right = NextFootstep(stance, Foot::kRight, command, 1, Limits());
+  const Foothold stance{{1, 2}, std::numbers::pi / 2};  // ahead is y, left is −x
+  const Foothold right = NextFootstep(stance, Foot::kRight, command, 1, Limits());
   EXPECT_LT((right.position - Vector2d(1.2, 2.1)).norm(), 1e-12);
   EXPECT_NEAR(right.yaw, stance.yaw - 0.1, 1e-12);
-  const Footstep left = NextFootstep(stance, Foot::kLeft, command, 1, Limits());
+  const Foothold left = NextFootstep(stance, Foot::kLeft, command, 1, Limits());
   EXPECT_LT((left.position - Vector2d(1 - 0.17, 2.3)).norm(), 1e-12);
   EXPECT_NEAR(left.yaw, stance.yaw + 0.4, 1e-12);
   // It is taken over at once: who plans the feet plans how fast they set off.
@@ -48,7 +48,7 @@ TEST(Footsteps, TheCapturePointComesAgainWithEveryTwoStrides) {
   for (const Vector2d& velocity : {Vector2d(0, 0), Vector2d(0.5, 0), Vector2d(-0.3, 0),
                                    Vector2d(0, 0.2), Vector2d(0.4, -0.1)}) {
     const WalkCommand command{velocity, 0, true};
-    Footstep stance{{0.3, -0.1}, 0};
+    Foothold stance{{0.3, -0.1}, 0};
     Foot foot = Foot::kLeft;
     Vector2d point =
         stance.position + NominalStride(stance, foot, command, period, w, Limits()).begin;
@@ -76,8 +76,8 @@ TEST(Footsteps, TurningOnTheSpotComesBackToWhereItBegan) {
   const double turn = 2 * std::numbers::pi / 16;
   for (const double sign : {1.0, -1.0}) {
     WalkCommand command{{0, 0}, sign * 0.5 * turn, true};
-    Footstep stance{{0, -0.105}, 0};  // the right foot
-    const Footstep first = stance;
+    Foothold stance{{0, -0.105}, 0};  // the right foot
+    const Foothold first = stance;
     for (int i = 0; i < 32; ++i) {
       stance = NextFootstep(stance, i % 2 == 0 ? Foot::kLeft : Foot::kRight, command, 1, Limits());
     }
@@ -89,7 +89,7 @@ TEST(Footsteps, TurningOnTheSpotComesBackToWhereItBegan) {
 TEST(Footsteps, GoesAsFastAsCommanded) {
   for (const Vector2d& velocity :
        {Vector2d(0.2, 0), Vector2d(-0.1, 0), Vector2d(0, 0.05), Vector2d(0.1, -0.05)}) {
-    Footstep stance{{0, -0.105}, 0};
+    Foothold stance{{0, -0.105}, 0};
     for (int i = 0; i < 20; ++i) {
       stance = NextFootstep(stance, i % 2 == 0 ? Foot::kLeft : Foot::kRight, {velocity, 0, true},
                             0.8, Limits());
@@ -103,11 +103,11 @@ TEST(Footsteps, FeetNeverCrossOrTurnTowardsEachOther) {
   for (const double vx : {-1.0, 0.0, 1.0}) {
     for (const double vy : {-1.0, 0.0, 1.0}) {
       for (const double wz : {-1.0, 0.0, 1.0}) {
-        Footstep stance{{0, 0.105}, 0.3};  // the left foot
+        Foothold stance{{0, 0.105}, 0.3};  // the left foot
         for (int i = 0; i < 12; ++i) {
           const Foot foot = i % 2 == 0 ? Foot::kRight : Foot::kLeft;
           const double side = Side(foot);
-          const Footstep next = NextFootstep(stance, foot, {{vx, vy}, wz, true}, 1, Limits());
+          const Foothold next = NextFootstep(stance, foot, {{vx, vy}, wz, true}, 1, Limits());
           const Vector2d apart =
               Eigen::Rotation2Dd(-stance.yaw) * (next.position - stance.position);
           EXPECT_GE(side * apart.y(), Limits().least_spacing - 1e-12);
@@ -125,16 +125,16 @@ TEST(Footsteps, WhatALandingWasOffIsNotCarriedOn) {
   // error, not by the sum of 40.
   const WalkCommand command{{0.2, 0}, 0, true};
   const Vector2d error(0.004, 0.01);
-  Footstep way{{0, -0.105}, 0}, stance = way, adrift = way;
+  Foothold way{{0, -0.105}, 0}, stance = way, adrift = way;
   for (int i = 0; i < 40; ++i) {
     const Foot foot = i % 2 == 0 ? Foot::kLeft : Foot::kRight;
-    const auto next = [&](const Footstep& from) {
+    const auto next = [&](const Foothold& from) {
       return NextFootstep(from, foot, command, 1, Limits());
     };
     stance = Towards(next(stance), next(way), 0.03, stance, foot, Limits());
     adrift = Towards(next(adrift), next(way), 0, adrift, foot, Limits());
     way = next(way);
-    for (Footstep* step : {&stance, &adrift}) {
+    for (Foothold* step : {&stance, &adrift}) {
       step->position += error;
       step->yaw += 0.005;
     }
@@ -145,8 +145,8 @@ TEST(Footsteps, WhatALandingWasOffIsNotCarriedOn) {
 }
 
 TEST(Footsteps, AWayThatIsFarIsComeBackToByStepsThatDoNotCross) {
-  const Footstep stance{{0, 0.105}, 0}, step{{0.1, -0.085}, 0}, far{{0.1, 0.5}, 1};
-  const Footstep moved = Towards(step, far, 0.03, stance, Foot::kRight, Limits());
+  const Foothold stance{{0, 0.105}, 0}, step{{0.1, -0.085}, 0}, far{{0.1, 0.5}, 1};
+  const Foothold moved = Towards(step, far, 0.03, stance, Foot::kRight, Limits());
   EXPECT_NEAR(moved.position.y(), 0.105 - Limits().least_spacing, 1e-12);
   EXPECT_NEAR(moved.yaw, 0.03, 1e-12);
 }

@@ -8,16 +8,21 @@
 #include <cmath>
 #include <functional>
 
+#include "components/step_planner/planner_config.h"
+
 namespace poise {
 namespace {
 
 using State = Landing::State;
 
+/// As phases ship it.
+LandingSpec Shipped() { return MakeLandingSpec(ContactConfirmation()); }
+
 constexpr double kTick = 0.002;
 
 TEST(TouchDetector, CountsALoadThatLasts) {
-  const ContactConfirmation config;
-  TouchDetector touch;
+  const LandingSpec config = Shipped();
+  TouchDetector touch(config.touch_duration);
   int tick = 0;
   const auto hold = [&](double load, int ticks) {
     bool touching = false;
@@ -39,7 +44,7 @@ TEST(TouchDetector, CountsALoadThatLasts) {
 }
 
 TEST(TouchDetector, TimeIsThatOfTheTicks) {
-  const ContactConfirmation config;
+  const LandingSpec config = Shipped();
   TouchDetector touch(0.1);
   EXPECT_FALSE(touch.Update(7.00, 20, LoadLevels(config, 0)));
   EXPECT_FALSE(touch.Update(7.09, 20, LoadLevels(config, 0)));
@@ -57,7 +62,7 @@ class Foot {
   static constexpr double kStiction = 1e5, kDrag = 300;        // N/m, N·s/m, joints
   static constexpr int kSteps = 40;                            // in a tick
 
-  Foot(const ContactConfirmation& config, double z, double friction)
+  Foot(const LandingSpec& config, double z, double friction)
       : landing(config), z_(z), anchor_(z), friction_(friction) {
     reference.position.z() = z;
     scenario_ = reference;
@@ -122,7 +127,7 @@ class Foot {
 };
 
 // Lifted by 0.12 m, then lowered to 0.085 m in 2 s.
-Foot Lowered(double surface, double friction = 8, const ContactConfirmation& config = {}) {
+Foot Lowered(double surface, double friction = 8, const LandingSpec& config = Shipped()) {
   Foot foot(config, 0, friction);
   foot.Move(0.12, 2);
   foot.Run(3, 0, false);
@@ -233,7 +238,7 @@ TEST(Landing, ASurfaceThatGoesAwayIsSearchedForAgain) {
 }
 
 TEST(Landing, BeforeAnotherSingleSupportPhaseItRestsWhereTheSurfaceLeftIt) {
-  Foot foot({}, 0, 8);
+  Foot foot(Shipped(), 0, 8);
   foot.Move(0.12, 2);
   foot.Run(3, 0, false);
   for (int i = 0; i < 500; ++i) foot.Step(0.105 + 0.02 * kTick * i, false, false);
@@ -245,14 +250,14 @@ TEST(Landing, BeforeAnotherSingleSupportPhaseItRestsWhereTheSurfaceLeftIt) {
 }
 
 TEST(Landing, OnlyALoweredFootSearchesByItself) {
-  Foot foot({}, 0, 8);
+  Foot foot(Shipped(), 0, 8);
   foot.Move(0.12, 2);
   foot.Run(5, 0, true);
   EXPECT_EQ(foot.landing.state(), State::kSwing);
   foot.Step(0, true, true);  // double support is due: now it must come down
   EXPECT_EQ(foot.landing.state(), State::kSearching);
 
-  Foot lowered({}, 0, 8);
+  Foot lowered(Shipped(), 0, 8);
   lowered.Move(0.12, 2);
   lowered.Run(3, 0, false);
   lowered.Move(0.085, 2);
@@ -261,7 +266,7 @@ TEST(Landing, OnlyALoweredFootSearchesByItself) {
 }
 
 TEST(Landing, AFootThatHasNotLeftTheGroundStands) {
-  const ContactConfirmation config;
+  const LandingSpec config = Shipped();
   Landing landing(config);
   landing.LiftOff(0);
   PointMotion reference;
@@ -290,7 +295,7 @@ TEST(Landing, AMoveUpwardTakesATouchingFootOff) {
 }
 
 TEST(Landing, ATapOnTheWayUpDoesNotEndTheMove) {
-  Foot foot({}, 0, 8);
+  Foot foot(Shipped(), 0, 8);
   foot.Move(0.12, 2);
   foot.Run(0.5, 0, false);
   foot.Run(0.1, foot.z() + 0.005, false);  // something in the way, then gone
@@ -301,7 +306,7 @@ TEST(Landing, ATapOnTheWayUpDoesNotEndTheMove) {
 
 // The sole takes the surface's slope and place: what it touches with is let go in all axes.
 TEST(Landing, ATouchingFootsReferenceComesToItsSole) {
-  const ContactConfirmation config;
+  const LandingSpec config = Shipped();
   Landing landing(config);
   landing.LiftOff(0);
   Eigen::Isometry3d sole = Eigen::Isometry3d::Identity();
@@ -324,13 +329,20 @@ TEST(Landing, ATouchingFootsReferenceComesToItsSole) {
   EXPECT_LT((rotation - sole.linear()).norm(), 1e-4);
 }
 
-TEST(Landing, NothingIsReplacedWhenNoConfirmationIsRequired) {
-  ContactConfirmation config;
-  config.set_required(false);
-  Foot foot = Lowered(0.08, 8, config);
-  foot.Run(3, 0.08, true, true);
-  EXPECT_EQ(foot.landing.state(), State::kSwing);
-  EXPECT_NEAR(foot.reference.position.z(), 0.085, 1e-12);
+// A foot of a walk, which meets a step on its way up and the ground as it comes down.
+TEST(Landing, ASwingLeavesBehindWhatItMeetsOnItsWayUp) {
+  LandingSpec spec = Shipped();
+  spec.settle = spec.touch_duration = 0;
+  Landing landing(spec);
+  PointMotion reference;
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  landing.BeginSwing(0, 0.2);
+  for (int tick = 0; tick < 200; ++tick) {
+    const double time = kTick * tick;
+    landing.Measure(time, time < 0.1 || time > 0.3 ? 100 : 0);
+    landing.Update(true, false, Eigen::Isometry3d::Identity(), &reference, &rotation);
+    EXPECT_EQ(landing.confirmed(), time > 0.3) << time;
+  }
 }
 
 }  // namespace

@@ -173,7 +173,7 @@ class World {
                 0);
     }
     // The centre of pressure asked for goes, it does not jump; but for a foot that swings at once.
-    if (before != Stage::kIdle) {
+    if (before != Stage::kStanding) {
       largest_jump_ = std::max(largest_jump_, (output.cop - last_cop_).norm());
     } else {
       decided_ = time_;
@@ -284,12 +284,12 @@ TEST_P(RecoveryCase, NoFootIsSentFartherThanLegsReachHoweverHardThePush) {
         world.Tick();
         const Recovery& recovery = world.recovery();
         if (recovery.stage() != Stage::kUnloading && recovery.stage() != Stage::kSwinging) continue;
-        const StepPlan& plan = recovery.plan();
+        const Footstep& step = recovery.steps().first();
         const Vector2d stance =
-            world.soles()[robot::Index(Other(plan.foot))].translation().head<2>();
-        ASSERT_TRUE(plan.foothold.allFinite()) << i << ' ' << share;
-        ASSERT_LT((plan.foothold - stance).norm(), farthest) << i << ' ' << share;
-        ASSERT_LT(recovery.touch_down() - world.time(), 4 / world.Frequency()) << i << ' ' << share;
+            world.soles()[robot::Index(Other(step.foot))].translation().head<2>();
+        ASSERT_TRUE(step.at.position.allFinite()) << i << ' ' << share;
+        ASSERT_LT((step.at.position - stance).norm(), farthest) << i << ' ' << share;
+        ASSERT_LT(step.touch_down - world.time(), 4 / world.Frequency()) << i << ' ' << share;
       }
       steps += world.recovery().num_steps();
     }

@@ -22,7 +22,7 @@ namespace {
 using robot::TestRobot;
 using stepping::QuasiStaticWalk;
 using stepping::StepInput;
-using stepping::WalkStage;
+using stepping::Stage;
 
 constexpr double kPeriod = 0.002;   // s
 constexpr double kStiffness = 1e5;  // N/m with which a foot presses below the ground
@@ -59,7 +59,7 @@ class StillWorld {
   }
 
   /// s until `stage`; 10 when it does not come.
-  double Until(WalkStage stage, const stepping::WalkCommand& command) {
+  double Until(Stage stage, const stepping::WalkCommand& command) {
     const double start = input_.time;
     while (walk_.stage() != stage && input_.time < start + 10) Tick(command);
     return input_.time - start;
@@ -108,8 +108,8 @@ TEST(WalkDefaults, AreOneWalkInUnitsOfGravityAndHeight) {
   StillWorld first(papers, Enabled()), second(other, Enabled());
   EXPECT_NEAR(second.walk().period(), std::sqrt(ratio) * first.walk().period(), 1e-12);
   // From a stand to the first lift-off, and the first step's length: accelerations are of g.
-  EXPECT_NEAR(second.Until(WalkStage::kSwinging, kAhead),
-              std::sqrt(ratio) * first.Until(WalkStage::kSwinging, kAhead), 2 * kPeriod);
+  EXPECT_NEAR(second.Until(Stage::kSwinging, kAhead),
+              std::sqrt(ratio) * first.Until(Stage::kSwinging, kAhead), 2 * kPeriod);
   EXPECT_NEAR(second.walk().command().velocity.x(),
               std::sqrt(ratio) * first.walk().command().velocity.x(), 1e-12);
 

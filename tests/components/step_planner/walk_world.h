@@ -36,7 +36,7 @@ class World {
     const StepChoice choice = MakeWalkChoice(WalkConfig(), model_);
     spec_ = MakeQuasiStaticSpec(WalkConfig(), ContactConfirmation(), model_, choice);
     spec_.weight = kWeight;
-    spec_.press_load = kDownLoad;
+    spec_.landing.press_load = kDownLoad;
     walk_ = QuasiStaticWalk(choice, spec_);
     const StepLimits& limits = choice.limits();
     sole_margin_ = limits.sole_margin;
@@ -74,7 +74,7 @@ class World {
   }
 
   /// False: it has not come to `stage` within 10 s.
-  bool RunTo(WalkStage stage, const WalkCommand& command) {
+  bool RunTo(Stage stage, const WalkCommand& command) {
     const double end = time_ + 10;
     while (walk_.stage() != stage && time_ < end) Tick(command);
     return walk_.stage() == stage;
@@ -156,7 +156,7 @@ class World {
       sole_[i].translation() = output.swing.position;
       sole_[i].linear() = output.swing_rotation.rotation;
       double& z = sole_[i].translation().z();
-      const bool pressed = walk_.stage() == WalkStage::kTouching;
+      const bool pressed = walk_.stage() == Stage::kTouching;
       const double ground = Ground(sole_[i]) - (pressed ? soft_ : 0);
       if (pressed || output.swing.velocity.z() < 0) z = std::max(z, ground);
       if (pressed && soft_ > 0) z = ground;
