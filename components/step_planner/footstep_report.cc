@@ -52,8 +52,8 @@ void Put(int i, const stepping::Footstep& step, double ground, double left, Repo
 void ReportPlanned(const FootstepInput& input, const stepping::Recovery* recovery,
                    const QuasiStaticWalk* walk, Report* out) {
   const stepping::ContactPlan* const plan = walk != nullptr && walk->active() ? &walk->steps()
-                                            : recovery != nullptr ? &recovery->steps()
-                                                                  : nullptr;
+                                            : recovery != nullptr             ? &recovery->steps()
+                                                                              : nullptr;
   int count = 0;
   if (plan != nullptr && !plan->empty()) {
     const double ground = input.sole[Other(plan->first().foot)].translation().z();

@@ -3,7 +3,7 @@
 namespace poise {
 namespace {
 
-// m beyond `start` that the capture point must be inside for kHoldTime until the body returns: a
+// m beyond kStart that the capture point must be inside for kHoldTime until the body returns: a
 // body that returned sooner would turn again.
 constexpr double kInside = 0.02;
 constexpr double kHoldTime = 0.2;  // s
@@ -21,7 +21,7 @@ PointMotion HipStrategy::Update(const HipInput& input) {
     case State::kReturning:
       if (excess > 0) {
         const Eigen::Vector3d axis = Eigen::Vector3d::UnitZ().cross(input.excess) / excess;
-        Enter(State::kTilting, time, now, config_.tilt() * axis, config_.tilt_time());
+        Enter(State::kTilting, time, now, kTilt * axis, kTiltTime);
       } else if (time >= since_ + kReturnTime) {
         state_ = State::kUpright;
       }
@@ -31,7 +31,7 @@ PointMotion HipStrategy::Update(const HipInput& input) {
         // The natural end of a quintic whose acceleration vanishes at both ends.
         const double time_left = kBrakeTime;
         Enter(State::kTilted, time, now, now.position + 0.5 * time_left * now.velocity, time_left);
-      } else if (time >= since_ + config_.tilt_time()) {
+      } else if (time >= since_ + kTiltTime) {
         state_ = State::kTilted;
         since_ = time;
       }

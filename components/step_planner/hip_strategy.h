@@ -6,7 +6,6 @@
 #include "components/framework/state_archive.h"
 #include "components/messages/motion.h"
 #include "components/messages/quintic_move.h"
-#include "components/step_planner/step_planner.pb.h"
 
 namespace poise {
 
@@ -14,7 +13,7 @@ namespace poise {
 struct HipInput {
   double time = 0;  ///< s, not decreasing
   /// m, world, horizontal: the capture point less the nearest point of the soles' hull less
-  /// `start`; zero inside.
+  /// kStart; zero inside.
   Eigen::Vector3d excess = Eigen::Vector3d::Zero();
   double margin = 0;  ///< m, of the capture point inside that hull; negative: outside
   bool near_joint_limit = false;
@@ -28,12 +27,16 @@ class HipStrategy {
  public:
   enum class State { kUpright, kTilting, kTilted, kReturning };
 
+  /// m inside the edge of the soles in contact, fitted as the two below
+  /// (docs/reference/balance.md). Sooner: small pushes turn the body, too; later: the excess has
+  /// grown.
+  static constexpr double kStart = 0.02;
+  static constexpr double kTilt = 0.6;  ///< rad that the body turns; 0.8 rad count as a fall
+  /// s, by minimum jerk: 5.77 kTilt / kTiltTime² is the acceleration, some 28 rad/s².
+  static constexpr double kTiltTime = 0.35;
   /// s in which a turn that ends early is stopped.
   static constexpr double kBrakeTime = 0.12;
 
-  explicit HipStrategy(const HipStrategyConfig& config) : config_(config) {}
-
-  bool enabled() const { return config_.enabled(); }
   /// The body's tilt as a rotation vector in the world, rad, and its derivatives in time.
   PointMotion Update(const HipInput& input);
   State state() const { return state_; }
@@ -43,7 +46,6 @@ class HipStrategy {
   void Enter(State state, double time, const PointMotion& from, const Eigen::Vector3d& tilt,
              double duration);
 
-  HipStrategyConfig config_;
   State state_ = State::kUpright;
   double since_ = 0;  // s, when the move under way began; while tilted: last time not well inside
   QuinticMove tilt_;

@@ -130,20 +130,18 @@ double MostLowering(const robot::RobotModel& model, double wanted) {
   return holds(wanted) ? wanted : Largest(wanted, holds);
 }
 
-void CheckGap(const std::string& part, double gap, const robot::RobotModel& model,
-              const stepping::Reach& reach) {
+void CheckGap(double gap, const robot::RobotModel& model, const stepping::Reach& reach) {
   const double widest = WidestSpacing(reach);
   if (reach.least_spacing() <= widest) return;
   const double most = widest - (reach.least_spacing() - gap);
   if (most <= 0) {
     throw ConfigError(
-        part + ".gap",
-        fmt::format("is {} m; robot '{}' brings a foot down {:.3f} m beside its COM at "
-                    "most, and its soles are {:.3f} m wide: there is no gap that its "
-                    "legs allow; look at their joints' limits in its file",
-                    gap, model.name(), widest, reach.least_spacing() - gap));
+        "walk.gap", fmt::format("is {} m; robot '{}' brings a foot down {:.3f} m beside its COM at "
+                                "most, and its soles are {:.3f} m wide: there is no gap that its "
+                                "legs allow; look at their joints' limits in its file",
+                                gap, model.name(), widest, reach.least_spacing() - gap));
   }
-  throw ConfigError(part + ".gap",
+  throw ConfigError("walk.gap",
                     fmt::format("is {} m; robot '{}', standing on one foot, cannot bring the other "
                                 "down so far beside it: give 0 to {:.3f} m",
                                 gap, model.name(), most));
@@ -171,10 +169,10 @@ void CheckStanceLegs(double distance, const robot::RobotModel& model, const step
                   model.name(), beside, distance, joints.empty() ? "" : ": ", joints, reserve));
 }
 
-void CheckClearance(const std::string& part, double clearance, const robot::RobotModel& model) {
+void CheckClearance(double clearance, const robot::RobotModel& model) {
   if (Raises(model, clearance)) return;
   const double most = Largest(clearance, [&](double c) { return Raises(model, c); });
-  throw ConfigError(part + ".clearance",
+  throw ConfigError("walk.clearance",
                     fmt::format("is {} m; the legs of robot '{}' raise a sole by {:.3f} m at most: "
                                 "give less",
                                 clearance, model.name(), most));

@@ -1,8 +1,6 @@
 // What a robot's legs cannot do, whatever else is configured.
 #pragma once
 
-#include <string>
-
 #include "components/robot/robot_model.h"
 #include "components/step_planner/stepping/reach.h"
 
@@ -20,16 +18,15 @@ double LongestStride(const stepping::Reach& reach, double spacing);
 /// the robot with 0.6 of its joints' torque: a step takes the rest.
 double MostLowering(const robot::RobotModel& model, double wanted);
 
-/// Throw ConfigError "`part`.gap", "`part`.clearance" with the greatest value that the legs allow.
+/// Throw ConfigError "walk.gap", "walk.clearance" with the greatest value that the legs allow.
 /// `reach`: with that gap.
-void CheckGap(const std::string& part, double gap, const robot::RobotModel& model,
-              const stepping::Reach& reach);
+void CheckGap(double gap, const robot::RobotModel& model, const stepping::Reach& reach);
 /// Throws ConfigError "walk.quasi_static" with the joints that keep either sole from standing
 /// within `distance` m of right below the COM. `reach`: at `height` m, `reserve` rad off the
 /// joints' limits.
 void CheckStanceLegs(double distance, const robot::RobotModel& model, const stepping::Reach& reach,
                      double height, double reserve);
 /// `clearance`: m by which either foot is raised, the COM as high as standing.
-void CheckClearance(const std::string& part, double clearance, const robot::RobotModel& model);
+void CheckClearance(double clearance, const robot::RobotModel& model);
 
 }  // namespace poise

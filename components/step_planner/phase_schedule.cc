@@ -119,7 +119,7 @@ WaitingFor PhaseSchedule::Hindrance(const ScheduleInput& input) const {
   if (Unloads() && !input.com_over_foot[Other(robot::FootAt(phase().transition().foot()))]) {
     return WaitingFor::kCom;
   }
-  if (config_.contact().required() && BeforeTouchDown()) {
+  if (BeforeTouchDown()) {
     const Foot foot = phase().support() == RIGHT ? Foot::kLeft : Foot::kRight;
     if (!input.foot_confirmed[foot]) return WaitingFor::kContact;
   }

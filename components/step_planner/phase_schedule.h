@@ -53,9 +53,9 @@ class PhaseSchedule {
 
   /// An unloading, or the lift-off after it, that is due while the other foot cannot carry waits,
   /// and with it everything later in the phase; the references under way go on, so that the COM can
-  /// arrive. So waits double support, when contact.required, until the foot that comes down is
-  /// confirmed. Of several outcomes in a tick the first of CONTACT_LOST, NO_SURFACE, TIMEOUT and
-  /// DONE that leads somewhere counts.
+  /// arrive. So waits double support until the foot that comes down is confirmed. Of several
+  /// outcomes in a tick the first of CONTACT_LOST, NO_SURFACE, TIMEOUT and DONE that leads
+  /// somewhere counts.
   const ScheduleState& Advance(const ScheduleInput& input);
 
   /// In place of Advance while another planner acts: all that is later comes later. What acts ends

@@ -12,7 +12,6 @@
 #include "components/framework/tick_time.h"
 #include "components/robot/sole.h"
 #include "components/step_planner/phase_graph.h"
-#include "components/step_planner/recovery_config.h"
 #include "components/step_planner/walk_config.h"
 
 namespace poise {
@@ -93,8 +92,8 @@ bool Waits(const StepPlannerConfig& config, const PhaseGraph& graph, int index) 
   const int next = graph.Follower(index, DONE);
   const bool unloads =
       phase.has_transition() && phase.transition().kind() == ContactTransition::UNLOAD;
-  const bool touches = config.contact().required() && phase.support() != DOUBLE &&
-                       next != PhaseGraph::kNone && config.phase(next).support() == DOUBLE;
+  const bool touches = phase.support() != DOUBLE && next != PhaseGraph::kNone &&
+                       config.phase(next).support() == DOUBLE;
   return unloads || touches;
 }
 
@@ -122,12 +121,11 @@ void CheckArrow(const StepPlannerConfig& config, const PhaseGraph& graph,
     throw ConfigError(listed ? Field(arrow.to) + ".support" : next + ".to",
                       "exchanges the stance foot at once; put a DOUBLE phase between");
   }
-  const bool confirms = config.contact().required();
-  if (from.support() != DOUBLE && to.support() == DOUBLE && confirms) {
+  if (from.support() != DOUBLE && to.support() == DOUBLE) {
     if (from.gravity_compensation()) {
       throw ConfigError(Field(arrow.from) + ".gravity_compensation",
-                        "lowers no foot, but the next phase waits for one to touch down; set "
-                        "contact.required: false, or a phase with tasks between");
+                        "lowers no foot, but the next phase waits for one to touch down; put a "
+                        "phase with tasks between");
     }
     if (arrow.outcome != DONE) {
       throw ConfigError(next + ".to", fmt::format("stands on both feet, but after {} no contact "
@@ -137,12 +135,12 @@ void CheckArrow(const StepPlannerConfig& config, const PhaseGraph& graph,
   }
   if (arrow.outcome == NO_SURFACE) {
     const int done = graph.Follower(arrow.from, DONE);
-    const bool lowers = confirms && from.support() != DOUBLE && done != PhaseGraph::kNone &&
+    const bool lowers = from.support() != DOUBLE && done != PhaseGraph::kNone &&
                         config.phase(done).support() == DOUBLE;
     if (!lowers) {
       throw ConfigError(next + ".on",
                         "NO_SURFACE never comes: the phase lowers no foot, as it is "
-                        "not followed by a DOUBLE one that waits for contact");
+                        "not followed by a DOUBLE one");
     }
   }
   const bool lifts = from.support() == DOUBLE && to.support() != DOUBLE;
@@ -153,63 +151,36 @@ void CheckArrow(const StepPlannerConfig& config, const PhaseGraph& graph,
   }
 }
 
-void CheckContact(const ContactConfirmation& contact) {
-  if (contact.release_load() >= contact.touch_load()) {
-    throw ConfigError("contact.release_load",
-                      fmt::format("is {} N; must be below touch_load, {} N, or contact flickers",
-                                  contact.release_load(), contact.touch_load()));
-  }
-  if (contact.press_load() <= contact.touch_load()) {
-    throw ConfigError("contact.press_load",
-                      fmt::format("is {} N; must be above touch_load, {} N, or the search comes to "
-                                  "a stand before contact counts",
-                                  contact.press_load(), contact.touch_load()));
-  }
-}
-
-// The paper's distance of the limits from the edges of its sole, m.
+// m, the paper's distance of the limits from the edges of its sole: estimate and soft ground may be
+// off by as much.
 constexpr double kLengthReserve = 0.03, kWidthReserve = 0.025;
 
-double ReadStanceHalf(bool given, double value, double sole, double reserve, const char* field) {
-  if (!given) return std::max(0.5 * sole - reserve, 0.25 * sole);
-  if (value > 0.5 * sole) {
-    throw ConfigError(field,
-                      fmt::format("is {}; must be at most the sole's {} m", value, 0.5 * sole));
-  }
-  return value;
-}
+// Shares of touch_load below which contact is lost, so that it does not flicker, and at which a
+// search comes to a stand: above a touch by a reserve, below what tips the robot.
+constexpr double kReleaseShare = 0.4, kPressShare = 2;
 
 }  // namespace
 
-balance::ConvexPolygon StanceSole(const robot::FootModel& foot, const StepPlannerConfig& config) {
-  const Eigen::Vector2d half(
-      ReadStanceHalf(config.has_stance_half_length(), config.stance_half_length(), foot.length,
-                     kLengthReserve, "stance_half_length"),
-      ReadStanceHalf(config.has_stance_half_width(), config.stance_half_width(), foot.width,
-                     kWidthReserve, "stance_half_width"));
-  if (foot.rectangular()) return balance::Rectangle(half);
-  balance::ConvexPolygon sole =
-      balance::SolePolygon(foot, std::min(kWidthReserve, 0.5 * robot::InnerRadius(foot)));
-  for (const double sign : {1.0, -1.0}) {
-    if (config.has_stance_half_length()) sole = balance::Clip(sole, {{sign, 0}, half.x()});
-    if (config.has_stance_half_width()) sole = balance::Clip(sole, {{0, sign}, half.y()});
+balance::ConvexPolygon StanceSole(const robot::FootModel& foot) {
+  if (!foot.rectangular()) {
+    return balance::SolePolygon(foot, std::min(kWidthReserve, 0.5 * robot::InnerRadius(foot)));
   }
-  return sole;
+  const auto half = [](double size, double reserve) {
+    return std::max(0.5 * size - reserve, 0.25 * size);
+  };
+  return balance::Rectangle({half(foot.length, kLengthReserve), half(foot.width, kWidthReserve)});
 }
 
 LandingSpec MakeLandingSpec(const ContactConfirmation& config) {
   LandingSpec spec;
   spec.touch_load = config.touch_load();
-  spec.release_load = config.release_load();
-  spec.press_load = config.press_load();
-  spec.settle = config.settle_duration();
+  spec.release_load = kReleaseShare * config.touch_load();
+  spec.press_load = kPressShare * config.touch_load();
   spec.search_depth = config.search_depth();
   return spec;
 }
 
 void CheckStepPlannerConfig(const StepPlannerConfig& config) {
-  CheckContact(config.contact());
-  CheckRecoveryConfig(config.recovery());
   CheckWalkConfig(config.walk());
   for (int i = 0; i < config.phase_size(); ++i) {
     const Phase& phase = config.phase(i);

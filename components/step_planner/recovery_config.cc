@@ -13,7 +13,6 @@
 #include "components/balance/gains/gain_rule.h"
 #include "components/balance/tasks/centroidal_momentum.h"
 #include "components/framework/configuration/configuration.h"
-#include "components/framework/configuration/field_rules.h"
 #include "components/robot/dynamics.h"
 #include "components/robot/posture.h"
 #include "components/robot/sole.h"
@@ -39,23 +38,16 @@ constexpr double kLeastSwingEffort = 0.35, kMostSwingEffort = 0.9;
 // m/s by which a filter as fast as the gears allow may misjudge a swing foot. Fitted: heron, whose
 // gears are soft, stands 41 of 96 pushes with 0.35 of the effort and 33 with 0.9.
 constexpr double kSpeedError = 0.11;
-// m/s downward at which the sole meets the ground: sooner down is a larger push, harder a bounce.
-constexpr double kTouchSpeed = 0.25;
-// s before touch-down in which the foothold stays: a move within less would jerk the leg.
-constexpr double kFreeze = 0.05;
+// s of the ramp (61) before a foot leaves the ground, and s in the air at least.
+constexpr double kUnload = 0.02, kLeastSwing = 0.12;
+constexpr double kGap = 0.02;          // m between the soles, sideways
+constexpr double kComLowering = 0.06;  // m by which longer steps lower the COM at most
 // rad off the joints' limits at footholds: as far as a leg's joint overshoots.
 constexpr double kJointReserve = 0.1;
 // Share of the weight that an observed load must be above to be a landing: a leg that brakes its
 // swing was seen to be misjudged by 0.05, by more than three standard deviations.
 constexpr double kObservedLoad = 0.15;
 
-// ωT of a walk's step. Fitted: of 64 runs 56, 57 and 60 stand with 1.1, 1.3 and 1.5; G1 stands 136
-// of 192 pushes in a walk with 1.3, 127 with 1.1 and 112 with 1.5.
-constexpr double kStride = 1.3;
-// Share of g with which a commanded velocity is approached, and rad/s², the same of a turn rate:
-// some steps to full speed, each within reach.
-constexpr double kAcceleration = 0.05, kTurnAcceleration = 1;
-constexpr double kYawRate = 6;     // 1/s with which the body's heading follows the feet's
 constexpr double kMostTurn = 0.5;  // rad in a step: a hip turns by as much
 // Share of the standing height by which the COM walks lower, so that knees can give. Fitted: with
 // none iCub and heron fall as they step in place, with 0.09 iCub does.
@@ -119,28 +111,9 @@ double TurningInertia(const robot::RobotModel& model) {
   return least;
 }
 
-StepMotion RecoveryMotion(const RecoveryConfig& config) {
-  auto motion = GroupDefault<StepMotion, RecoveryConfig>("motion");
-  motion.MergeFrom(config.motion());
-  return motion;
-}
-
 }  // namespace
 
-void CheckRecoveryConfig(const RecoveryConfig& config) {
-  // Between two heights a share of the way is taken.
-  if (config.motion().has_com_lowering()) {
-    CheckPositive(config.motion().com_lowering(), "recovery.motion.com_lowering");
-  }
-  if (config.motion().settle() > 0) {
-    throw ConfigError("recovery.motion.settle",
-                      "is given; the foot of a recovery is a contact from its first load on, since "
-                      "the capture point runs on: leave it out");
-  }
-}
-
-stepping::StepChoice MakeStepChoice(const RecoveryConfig& config, const robot::RobotModel& model) {
-  const StepMotion motion = RecoveryMotion(config);
+stepping::StepChoice MakeStepChoice(const robot::RobotModel& model) {
   for (const robot::FootModel& foot : model.feet()) {
     if (kSoleMargin < robot::InnerRadius(foot)) continue;
     throw ConfigError("recovery",
@@ -148,18 +121,14 @@ stepping::StepChoice MakeStepChoice(const RecoveryConfig& config, const robot::R
                                   "which leaves nothing of the {} foot's, {} x {} m",
                                   kSoleMargin, foot.name, foot.length, foot.width));
   }
-  const stepping::Reach reach(model, robot::StandingHeight(model), motion.com_lowering(),
-                              kJointReserve, motion.gap());
+  const double height = robot::StandingHeight(model);
+  const stepping::Reach reach(model, height, kComLowering, kJointReserve, kGap);
   if (reach.empty()) {
-    throw ConfigError("recovery.motion.com_lowering",
-                      fmt::format("is {} m; robot '{}' cannot stand so much lower than {} m with "
-                                  "its joints {} rad off their limits: give less",
-                                  motion.com_lowering(), model.name(), robot::StandingHeight(model),
-                                  kJointReserve));
-  }
-  if (config.motion().has_gap()) CheckGap("recovery.motion", motion.gap(), model, reach);
-  if (config.motion().has_clearance()) {
-    CheckClearance("recovery.motion", motion.clearance(), model);
+    throw ConfigError("recovery",
+                      fmt::format("lowers the COM by {} m; robot '{}' cannot stand so much lower "
+                                  "than {} m with its joints {} rad off their limits: its file's "
+                                  "stance or limits leave no room to step",
+                                  kComLowering, model.name(), height, kJointReserve));
   }
   stepping::StepLimits limits;
   limits.sole_margin = kSoleMargin;
@@ -168,8 +137,8 @@ stepping::StepChoice MakeStepChoice(const RecoveryConfig& config, const robot::R
       kSpeedError * std::numbers::sqrt2 * std::numbers::pi * balance::StepCutoff(model);
   const double full = SwingAcceleration(model);
   limits.acceleration = std::clamp(followed, kLeastSwingEffort * full, kMostSwingEffort * full);
-  limits.least_swing = motion.swing();
-  limits.unload = motion.unload();
+  limits.least_swing = kLeastSwing;
+  limits.unload = kUnload;
   limits.overshoot = kOvershoot;
   limits.ample_margin = kAmpleMargin;
   limits.spacing = std::max(robot::StandingSpacing(model), reach.least_spacing());
@@ -184,33 +153,23 @@ stepping::StepChoice MakeStepChoice(const RecoveryConfig& config, const robot::R
 stepping::RecoverySpec MakeRecoverySpec(const RecoveryConfig& config,
                                         const ContactConfirmation& contact,
                                         const robot::RobotModel& model, double watched_margin) {
-  const StepMotion motion = RecoveryMotion(config);
   stepping::RecoverySpec spec;
   spec.margin_to_sole_edge = config.margin_to_sole_edge();
-  spec.load = motion.load();
-  spec.swing = {motion.clearance(), kTouchSpeed, kFreeze};
   spec.landing = MakeLandingSpec(contact);
   spec.landing.observed_load = kObservedLoad * model.total_mass() * robot::kGravity;
   // The first load counts: the foot bounces, and six milliseconds of steady load came 0.12 s late.
   spec.landing.touch_duration = spec.landing.settle = 0;
-  spec.landing.search_speed = kTouchSpeed;
-  spec.gain = motion.gain();
+  spec.landing.search_speed = stepping::Recovery::kSwing.touch_speed;
   spec.turn_share = TurningInertia(model) / (model.total_mass() * robot::kGravity);
-  spec.height_rate = motion.height_rate();
   spec.watched_margin = watched_margin;
-  spec.together_after = config.together_after();
-  spec.stride = kStride;
   spec.walk_lowering = MostLowering(model, kWalkLowering * robot::StandingHeight(model));
-  spec.holding_lowering = MostLowering(model, motion.com_lowering());
-  spec.acceleration = kAcceleration * robot::kGravity;
-  spec.turn_acceleration = kTurnAcceleration;
-  spec.yaw_rate = kYawRate;
+  spec.holding_lowering = MostLowering(model, kComLowering);
   return spec;
 }
 
 stepping::Recovery MakeRecovery(const RecoveryConfig& config, const ContactConfirmation& contact,
                                 const robot::RobotModel& model, double watched_margin) {
-  return {MakeStepChoice(config, model), MakeRecoverySpec(config, contact, model, watched_margin)};
+  return {MakeStepChoice(model), MakeRecoverySpec(config, contact, model, watched_margin)};
 }
 
 }  // namespace poise

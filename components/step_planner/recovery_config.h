@@ -7,12 +7,9 @@
 
 namespace poise {
 
-/// Throws ConfigError where numbers that keep their rules do not fit together.
-void CheckRecoveryConfig(const RecoveryConfig& config);
-
 /// Reach and limits of this robot's steps, whose COM stands at its standing height. Throws
-/// ConfigError when its legs reach nothing or not what is configured, or its soles are too small.
-stepping::StepChoice MakeStepChoice(const RecoveryConfig& config, const robot::RobotModel& model);
+/// ConfigError when its legs reach nothing, or its soles are too small.
+stepping::StepChoice MakeStepChoice(const robot::RobotModel& model);
 
 /// The numbers of this robot's recovery. `watched_margin`: RecoverySpec's.
 stepping::RecoverySpec MakeRecoverySpec(const RecoveryConfig& config,

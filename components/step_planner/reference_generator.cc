@@ -178,7 +178,7 @@ const References& ReferenceGenerator::Update(double time, const Eigen::Vector3d&
   const PointMotion on_time = com_.At(time);
   const double speed = on_time.velocity.norm();
   const double lag = speed > 0 ? (on_time.position - com).dot(on_time.velocity) / speed : 0;
-  const double rate = std::clamp(2 * (1 - lag / com_lag_), 0.0, 1.0);
+  const double rate = std::clamp(2 * (1 - lag / kComLag), 0.0, 1.0);
   references_.com = com_.Slow(time, TickPeriod(time - time_), rate);
   time_ = time;
   for (const Foot f : kFeet) {

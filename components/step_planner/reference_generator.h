@@ -77,9 +77,10 @@ struct References {
 /// a phase of gravity compensation they start from the estimated pose again.
 class ReferenceGenerator {
  public:
-  /// `com_lag`: m, of the COM behind a move of its reference, at which the move stands still; from
-  /// half of it on it slows down.
-  explicit ReferenceGenerator(double com_lag) : com_lag_(com_lag) {}
+  /// m, of the COM behind a move of its reference, at which the move stands still; from half of it
+  /// on it slows down. What the centre of pressure's region or the joints' friction holds back
+  /// would else be asked for by ever more acceleration.
+  static constexpr double kComLag = 0.03;
 
   /// First tick: everything holds where it is. COM targets of the phase are set relative to that.
   void BeginPhase(const Phase& phase, const EstimatedPose& estimate, double time);
@@ -110,7 +111,6 @@ class ReferenceGenerator {
   Eigen::Vector3d ComTarget(const ComReference& com, const EstimatedPose& estimate,
                             const Eigen::Vector3d& standing) const;
 
-  double com_lag_;
   double time_ = 0;  // s, of the last update
   bool anchored_ = false;
   bool shifts_ = false;  // the COM's last move is a shift

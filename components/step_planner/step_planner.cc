@@ -64,7 +64,6 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   whole_body_ = context.shared->Get<balance::WholeBody>(
       "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
   schedule_.emplace(config);
-  generator_.emplace(config.com_lag());
   stance_follower_ = StanceFollower(kFollowFrom);
   ConfigureLimits(config);
   const LandingSpec landing = MakeLandingSpec(config.contact());
@@ -73,9 +72,8 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   walks_by_steps_ = config.walk().enabled() && !config.walk().quasi_static();
   makes_steps_ = config.recovery().enabled() || walks_by_steps_;
   if (makes_steps_) {
-    const HipStrategyConfig& hip = config.hip_strategy();
     recovery_ = MakeRecovery(config.recovery(), config.contact(), *model_,
-                             hip.enabled() ? hip.start() : -1);
+                             tilts_ ? HipStrategy::kStart : -1);
   }
   walks_quasi_static_ = config.walk().enabled() && !walks_by_steps_;
   stride_port_ = walks_by_steps_ && config.walk().stride_port();
@@ -117,25 +115,25 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
 }
 
 void StepPlanner::ConfigureLimits(const StepPlannerConfig& config) {
-  const HipStrategyConfig& hip = config.hip_strategy();
+  tilts_ = config.hip_strategy().enabled();
   for (const Foot f : kFeet) {
     const robot::FootModel& foot = model_->feet()[f];
-    if (hip.start() >= robot::InnerRadius(foot)) {
-      throw ConfigError("hip_strategy.start",
-                        fmt::format("is {} m and leaves nothing of the {} foot's sole, {} x {} m",
-                                    hip.start(), foot.name, foot.length, foot.width));
+    if (tilts_ && HipStrategy::kStart >= robot::InnerRadius(foot)) {
+      throw ConfigError("hip_strategy.enabled",
+                        fmt::format("is true: the body turns {} m inside the soles' edge, which "
+                                    "leaves nothing of the {} foot's, {} x {} m",
+                                    HipStrategy::kStart, foot.name, foot.length, foot.width));
     }
     sole_[f] = balance::SolePolygon(foot, 0);
-    tilt_sole_[f] = balance::SolePolygon(foot, hip.start());
-    stance_sole_[f] = StanceSole(foot, config);
+    if (tilts_) tilt_sole_[f] = balance::SolePolygon(foot, HipStrategy::kStart);
+    stance_sole_[f] = StanceSole(foot);
   }
-  hip_strategy_.emplace(hip);
 }
 
 bool StepPlanner::Archive(StateArchive* archive) {
-  archive->Show(operator_, operator_walk_, *schedule_, *generator_, stance_follower_,
-                *hip_strategy_, references_, in_contact_, last_controlled_, owner_, untilted_,
-                was_free_, step_needed_, planned_, recovery_, walk_, footstep_report_);
+  archive->Show(operator_, operator_walk_, *schedule_, generator_, stance_follower_, hip_strategy_,
+                references_, in_contact_, last_controlled_, owner_, untilted_, was_free_,
+                step_needed_, planned_, recovery_, walk_, footstep_report_);
   for (const Foot f : kFeet) archive->Show(landing_[f], contact_loss_[f]);
   ArchiveMessage(&*support_plan_, archive);
   if (makes_steps_ || walks_quasi_static_) ArchiveMessage(&*footsteps_, archive);
@@ -275,7 +273,7 @@ void StepPlanner::HandOver(FeetOwner to, double time) {
   if (ends) EndSteps(*Steps(), time);
   // The body stays where the walk has turned it.
   if (from == FeetOwner::kWalk || (from == FeetOwner::kRecovery && recovery_.turns())) {
-    generator_->HoldBody(untilted_);
+    generator_.HoldBody(untilted_);
   }
   owner_ = to;
 }
@@ -331,7 +329,7 @@ void StepPlanner::EndSteps(const stepping::StepOutput& steps, double time) {
   com.position << data.com.head<2>(), steps.com.position.z();
   com.velocity << data.com_velocity.head<2>(), steps.com.velocity.z();
   rest.z() = com.position.z();
-  generator_->Anchor(estimate, com, rest, time, kSettleTime);
+  generator_.Anchor(estimate, com, rest, time, kSettleTime);
 }
 
 void StepPlanner::BeginPhase(double time) {
@@ -343,7 +341,7 @@ void StepPlanner::BeginPhase(double time) {
       phase.has_com() && com != ComReference::HOLD && com != ComReference::SHIFT;
   if (above_soles) stance_follower_.Restart();
   // The first phase begins with the run; its moves wait for the scenario's time 0.
-  generator_->BeginPhase(phase, estimate, schedule.first ? std::max(time, 0.0) : time);
+  generator_.BeginPhase(phase, estimate, schedule.first ? std::max(time, 0.0) : time);
   const robot::FootArray<bool> last_contact = in_contact_;
   in_contact_ = ContactsOf(phase.support());
   for (const Foot f : kFeet) {
@@ -359,9 +357,9 @@ void StepPlanner::BeginPhase(double time) {
     }
     const bool moves = phase.has_foot() && robot::FootAt(phase.foot().foot()) == f;
     const PointMotion& standing = references_.foot[f];
-    if (moves && !landing_[f].BeginMove(standing.position.z(), generator_->foot(f).target().z(),
-                                        generator_->foot(f).end())) {
-      generator_->HoldFoot(f, standing.position, references_.foot_rotation[f].rotation);
+    if (moves && !landing_[f].BeginMove(standing.position.z(), generator_.foot(f).target().z(),
+                                        generator_.foot(f).end())) {
+      generator_.HoldFoot(f, standing.position, references_.foot_rotation[f].rotation);
     }
   }
   last_controlled_ = !phase.gravity_compensation();
@@ -412,17 +410,17 @@ void StepPlanner::FollowSoles(double time) {
   const EstimatedPose estimate = Estimate();
   const StanceFollower::Stance stance{
       .sole = {estimate.sole[Foot::kRight].translation(), estimate.sole[Foot::kLeft].translation()},
-      .com = generator_->com_target(),
+      .com = generator_.com_target(),
       .planned = Count(in_contact_) == 2 && last_controlled_ && !Held() && !was_free_,
       .carried = robot_state_->foot_load_share[0] > 0 && robot_state_->foot_load_share[1] > 0,
-      .resting = generator_->ComRests(time)};
+      .resting = generator_.ComRests(time)};
   const Eigen::Vector3d way = stance_follower_.Update(time, stance);
-  if (!way.isZero(0)) generator_->ShiftCom(way, time, kSettleTime);
+  if (!way.isZero(0)) generator_.ShiftCom(way, time, kSettleTime);
 }
 
 void StepPlanner::UpdateReferences(double time, const Capture& capture) {
   const robot::RobotData& data = whole_body_->data();
-  references_ = generator_->Update(time, data.com);
+  references_ = generator_.Update(time, data.com);
   if (schedule_->phase().gravity_compensation()) return;
   if (const stepping::StepOutput* steps = Steps(); steps != nullptr) {
     references_.com = steps->com;
@@ -434,7 +432,7 @@ void StepPlanner::UpdateReferences(double time, const Capture& capture) {
     if (owner_ == FeetOwner::kWalk) TurnBody(walk_.body_yaw());
     if (owner_ == FeetOwner::kRecovery && recovery_.turns()) TurnBody(recovery_.body_yaw());
     untilted_ = references_.body.rotation;
-    if (hip_strategy_->enabled()) TiltBody(time, capture);
+    if (tilts_) TiltBody(time, capture);
     return;
   }
   const bool due = schedule_->state().waiting_for == WaitingFor::kContact;
@@ -444,11 +442,11 @@ void StepPlanner::UpdateReferences(double time, const Capture& capture) {
     Eigen::Matrix3d* rotation = &references_.foot_rotation[f].rotation;
     if (landing_[f].Update(schedule_->BeforeTouchDown(), due, data.foot_pose[f], foot, rotation)) {
       // Where the landing ends, the plan goes on from here.
-      generator_->HoldFoot(f, foot->position, *rotation);
+      generator_.HoldFoot(f, foot->position, *rotation);
       references_.foot_rotation[f] = {.rotation = *rotation};
     }
   }
-  if (hip_strategy_->enabled()) TiltBody(time, capture);
+  if (tilts_) TiltBody(time, capture);
 }
 
 void StepPlanner::TurnBody(const Quintic::Point& yaw) {
@@ -474,7 +472,7 @@ void StepPlanner::TiltBody(double time, const Capture& capture) {
   if (makes_steps_ && recovery_.would_step()) input.excess.setZero();
   // About one axis the rotation vector's derivatives are the angular velocity and acceleration; of
   // a turn that goes over into another, or comes upon the plan's own, only nearly.
-  const PointMotion tilt = hip_strategy_->Update(input);
+  const PointMotion tilt = hip_strategy_.Update(input);
   const double angle = tilt.position.norm();
   if (angle > 0) {
     references_.body.rotation =

@@ -110,9 +110,10 @@ class StepPlanner : public Component, public Operated {
   std::shared_ptr<const robot::RobotModel> model_;
   std::shared_ptr<balance::WholeBody> whole_body_;
   std::optional<PhaseSchedule> schedule_;
-  std::optional<ReferenceGenerator> generator_;
+  ReferenceGenerator generator_;
   StanceFollower stance_follower_{0};
-  std::optional<HipStrategy> hip_strategy_;
+  HipStrategy hip_strategy_;
+  bool tilts_ = false;  // hip_strategy.enabled
   robot::FootArray<Landing> landing_{Landing(LandingSpec())};
   robot::FootArray<ContactLoss> contact_loss_{ContactLoss(0)};
   HeldCondition step_needed_;

@@ -110,7 +110,8 @@ void ReportFeet(const SupportView& view, const robot::RobotData& data, support_p
     out.in_contact[Index(f)] = view.in_contact[f] ? 1 : 0;
     out.next_in_contact[Index(f)] = then[f] ? 1 : 0;
     out.foot_state[Index(f)] =
-        view.in_contact[f] ? support_plan_t::FOOT_SUPPORT
+        view.in_contact[f]
+            ? support_plan_t::FOOT_SUPPORT
             : FootCode(view.steps != nullptr ? view.steps->foot_state : view.landing[f].state());
     SetPose(data.foot_pose[f], &out.foot_pose[Index(f)]);
   }

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "components/framework/configuration/configuration.h"
-#include "components/framework/configuration/field_rules.h"
 #include "components/robot/posture.h"
 #include "components/robot/sole.h"
 #include "components/step_planner/leg_limits.h"
@@ -49,33 +48,32 @@ constexpr double kMostSinking = 0.3;
 // where a press on one corner had let expect three times as much.
 constexpr double kMostAhead = 0.08;
 
-// m/s that a sole sinks on average while it is loaded: the paper's robot loads as fast on 10 kN/m
-// as on hard ground.
-constexpr double kSinkSpeed = 0.04;
-
-// Ratio: share of the weight with which a foot that has touched is pressed down, so that the sole
-// lies down on what it has found. More than 0.4 would lift the other foot off its middle.
-constexpr double kPressShare = 0.1;
-
 // The numbers of the gait of the paper's robot, whose COM stands 0.75 m high. Another robot's is
 // the same in units of g and of its own height, so that as much of the capture point's error grows
 // in a step (RobotScale).
 constexpr double kDefaultHeight = 0.75;  // m
 constexpr double kStart = 0.8;           // s in which the COM leaves the middle for the stance foot
-constexpr double kFreeze = 0.1;          // s before touch-down: a foothold that moves then jerks
-constexpr double kStillTime = 0.3;       // s of rest until it stands: a swing of the COM is longer
-constexpr double kWidest = 0.12;         // m to the side in a step, beyond the feet side by side
-constexpr double kMostTurn = 0.35;       // rad in a step, not scaled: a hip turns by as much
-constexpr double kMostReturn = 0.03;     // m a step back to the course: more would be a lurch
+constexpr double kUnload = 0.8;          // s of the ramp (61) before a foot leaves the ground
+constexpr double kSwing = 1.1;           // s in the air
+// s from a touch until the foot is a contact of the model: its reference comes to where the sole
+// stands meanwhile, so that the change makes no step of the torque.
+constexpr double kSettle = 0.2;
+constexpr double kLoad = 0.8;          // s of the ramp after the foot has landed
+constexpr double kComLowering = 0.08;  // m below standing, so that knees can give
+constexpr double kHeightRate = 4;      // 1/s with which the COM's height goes where legs ask for it
+constexpr double kFreeze = 0.1;        // s before touch-down: a foothold that moves then jerks
+constexpr double kStillTime = 0.3;     // s of rest until it stands: a swing of the COM is longer
+constexpr double kWidest = 0.12;       // m to the side in a step, beyond the feet side by side
+constexpr double kMostTurn = 0.35;     // rad in a step, not scaled: a hip turns by as much
+constexpr double kMostReturn = 0.03;   // m a step back to the course: more would be a lurch
 constexpr double kReachLowering = 0.06;  // m below standing: footholds in reach leave knees bent
 constexpr double kStillDistance = 0.02;  // m from the soles' middle: as the estimate is known to
 constexpr double kTouchSpeed = 0.1;   // m/s downward: a foot that meets the ground harder bounces
 constexpr double kStillSpeed = 0.04;  // m/s of the COM, as kStillDistance in an ω
 constexpr double kYawRate = 5;        // 1/s with which the body's heading follows the feet's
 constexpr double kTurnAcceleration = 0.2;  // rad/s² with which the turn rate is approached
-// Not scaled: the acceleration is one of g, joints keep off their limits by an angle, and a hard
-// sole bounces as long on any robot.
-constexpr double kAcceleration = 0.1;     // m/s² with which the commanded velocity is approached
+// Not scaled: joints keep off their limits by an angle, and a hard sole bounces as long on any
+// robot.
 constexpr double kJointReserve = 0.1;     // rad off the joints' limits at footholds
 constexpr double kTouchDuration = 0.002;  // s of contact.touch_load that are a landing
 // A foot that touches is let go with a time constant of this share of its settling, which counts
@@ -103,44 +101,17 @@ class RobotScale {
   double length_, time_;
 };
 
-/// The motion of this robot's steps: gap and gain are what a foot and an estimate are off by.
-StepMotion WalkMotion(const WalkConfig& config, const RobotScale& scale) {
-  auto motion = GroupDefault<StepMotion, WalkConfig>("motion");
-  motion.set_unload(scale.Time(motion.unload()));
-  motion.set_swing(scale.Time(motion.swing()));
-  motion.set_load(scale.Time(motion.load()));
-  motion.set_settle(scale.Time(motion.settle()));
-  motion.set_clearance(scale.Length(motion.clearance()));
-  motion.set_com_lowering(scale.Length(motion.com_lowering()));
-  motion.set_height_rate(scale.Rate(motion.height_rate()));
-  motion.MergeFrom(config.motion());
-  return motion;
-}
-
 /// m of the capture point from the middle of the sole that carries, at which the other foot leaves
 /// the ground.
 double LiftOffDistance(const robot::RobotModel& model, const stepping::StepLimits& limits) {
   return 0.5 * (LeastInnerRadius(model) - limits.sole_margin);
 }
 
-/// Throws ConfigError on what is given and this robot's legs cannot do. `motion`: with the robot's
-/// defaults, which are no one's mistake.
-void CheckLegs(const WalkConfig& given, const StepMotion& motion, const robot::RobotModel& model,
+/// Throws ConfigError on what is given and this robot's legs cannot do.
+void CheckLegs(const WalkConfig& given, const robot::RobotModel& model,
                const stepping::Reach& reach, double spacing) {
-  const double height = robot::StandingHeight(model);
-  if (given.motion().has_com_lowering() && motion.com_lowering() > reach.lowering() &&
-      (motion.com_lowering() >= height ||
-       stepping::Reach(model, height, motion.com_lowering(), kJointReserve, motion.gap())
-           .empty())) {
-    throw ConfigError(
-        "walk.motion.com_lowering",
-        fmt::format("is {} m; robot '{}', whose COM stands {:.3f} m high, cannot "
-                    "stand so much lower with its joints {} rad off their limits: "
-                    "give less; it can {:.3f} m",
-                    motion.com_lowering(), model.name(), height, kJointReserve, reach.lowering()));
-  }
-  if (given.motion().has_gap()) CheckGap("walk.motion", motion.gap(), model, reach);
-  if (given.motion().has_clearance()) CheckClearance("walk.motion", motion.clearance(), model);
+  if (given.has_gap()) CheckGap(given.gap(), model, reach);
+  if (given.has_clearance()) CheckClearance(given.clearance(), model);
   const double longest = LongestStride(reach, spacing);
   if (given.has_longest() && given.longest() > longest) {
     throw ConfigError("walk.longest",
@@ -168,14 +139,12 @@ StrideSize QuasiStaticStride(const WalkConfig& config, const robot::RobotModel& 
 }
 
 StrideSize DynamicStride(const robot::RobotModel& model) {
-  const RecoveryConfig recovery;
-  const stepping::StepLimits limits = MakeStepChoice(recovery, model).limits();
+  const stepping::StepLimits limits = MakeStepChoice(model).limits();
   const double frequency = std::sqrt(robot::kGravity / robot::StandingHeight(model));
-  const double stride = MakeRecoverySpec(recovery, ContactConfirmation(), model, -1).stride;
   return {limits.longest,
           limits.widest,
           limits.most_turn,
-          stride / frequency,
+          stepping::Recovery::kStride / frequency,
           {"the legs span", "the legs span", "a foot turns"}};
 }
 
@@ -223,15 +192,12 @@ void CheckWalkConfig(const WalkConfig& config) {
     throw ConfigError("walk.stride_port",
                       "is true: needs walk.enabled=true and walk.quasi_static=false");
   }
-  if (config.motion().has_settle()) CheckPositive(config.motion().settle(), "walk.motion.settle");
 }
 
 stepping::StepChoice MakeWalkChoice(const WalkConfig& config, const robot::RobotModel& model) {
   const double height = robot::StandingHeight(model);
-  const RobotScale scale(model);
-  const StepMotion motion = WalkMotion(config, scale);
-  const double lowering = scale.Length(kReachLowering);
-  const stepping::Reach reach(model, height, lowering, kJointReserve, motion.gap());
+  const double lowering = RobotScale(model).Length(kReachLowering);
+  const stepping::Reach reach(model, height, lowering, kJointReserve, config.gap());
   if (reach.empty()) {
     throw ConfigError(
         "walk", fmt::format("robot '{}', whose COM stands {:.3f} m high, cannot stand {:.3f} m "
@@ -242,7 +208,7 @@ stepping::StepChoice MakeWalkChoice(const WalkConfig& config, const robot::Robot
   stepping::StepLimits limits;
   limits.sole_margin = kSoleMarginShare * LeastInnerRadius(model);
   limits.spacing = std::max(robot::StandingSpacing(model), reach.least_spacing());
-  CheckLegs(config, motion, model, reach, limits.spacing);
+  CheckLegs(config, model, reach, limits.spacing);
   CheckStanceLegs(LiftOffDistance(model, limits), model, reach, height, kJointReserve);
   return {model, reach, limits};
 }
@@ -252,45 +218,43 @@ stepping::QuasiStaticSpec MakeQuasiStaticSpec(const WalkConfig& config,
                                               const robot::RobotModel& model,
                                               const stepping::StepChoice& choice) {
   const RobotScale scale(model);
-  const StepMotion motion = WalkMotion(config, scale);
   const double height = robot::StandingHeight(model), radius = LeastInnerRadius(model);
   const double weight = robot::kGravity * model.total_mass();
   stepping::QuasiStaticSpec spec;
   spec.start = scale.Time(kStart);
-  spec.unload = motion.unload();
-  spec.swing = motion.swing();
-  spec.load = motion.load();
+  spec.unload = scale.Time(kUnload);
+  spec.swing = scale.Time(kSwing);
+  spec.load = scale.Time(kLoad);
   spec.step = {choice.limits().spacing, choice.reach().least_spacing(),
                config.has_longest() ? config.longest() : scale.Length(config.longest()),
                scale.Length(kWidest), kMostTurn};
-  spec.acceleration = kAcceleration;
   spec.turn_acceleration = scale.TurnAcceleration(kTurnAcceleration);
-  spec.foot = {motion.clearance(),  scale.Speed(kTouchSpeed),
-               scale.Time(kFreeze), kRiseShare * motion.clearance(),
+  const double clearance =
+      config.has_clearance() ? config.clearance() : scale.Length(config.clearance());
+  spec.foot = {clearance,           scale.Speed(kTouchSpeed),
+               scale.Time(kFreeze), kRiseShare * clearance,
                kAcrossShare,        kWaitShare};
   spec.landing = MakeLandingSpec(contact);
   spec.landing.touch_duration = kTouchDuration;
-  spec.landing.settle = motion.settle();
+  spec.landing.settle = scale.Time(kSettle);
   spec.landing.search_speed = scale.Speed(kTouchSpeed);
-  spec.landing.relax_time = kRelaxShare * std::min(motion.settle(), kLongestRelaxing);
-  spec.landing.press_load = std::max(kPressShare * weight, contact.touch_load());
+  spec.landing.relax_time = kRelaxShare * std::min(spec.landing.settle, kLongestRelaxing);
+  spec.landing.press_load =
+      std::max(stepping::QuasiStaticWalk::kPressShare * weight, contact.touch_load());
   spec.landing.presses = true;
-  spec.gain = motion.gain();
   spec.most_offset = kOffsetShare * radius;
-  spec.com_lowering = motion.com_lowering();
-  spec.height_rate = motion.height_rate();
+  spec.com_lowering = scale.Length(kComLowering);
+  spec.height_rate = scale.Rate(kHeightRate);
   spec.yaw_rate = scale.Rate(kYawRate);
   spec.still_distance = scale.Length(kStillDistance);
   spec.still_speed = scale.Speed(kStillSpeed);
   spec.still_time = scale.Time(kStillTime);
-  spec.press_share = kPressShare;
   spec.lift_off_distance = LiftOffDistance(model, choice.limits());
   spec.most_return = scale.Length(kMostReturn);
   spec.load_lead = kLoadLeadShare * radius;
   spec.weight = weight;
   spec.most_sinking = kMostSinking * height;
   spec.most_ahead = kMostAhead * height;
-  spec.sink_speed = kSinkSpeed;
   spec.soft = kSoftShare * radius;
   for (const KnownGroundConfig& edge : config.ground()) {
     spec.ground.Add(robot::FootAt(edge.foot()), edge.from(), edge.height());
@@ -340,8 +304,9 @@ std::vector<std::string> WalkWarnings(const WalkConfig& config, const robot::Rob
     }
   }
   if (config.quasi_static()) return warnings;
-  for (const auto& [name, given] : {std::pair{"motion", config.has_motion()},
-                                    {"longest", config.has_longest()},
+  for (const auto& [name, given] : {std::pair{"longest", config.has_longest()},
+                                    {"clearance", config.has_clearance()},
+                                    {"gap", config.has_gap()},
                                     {"ground", config.ground_size() > 0}}) {
     if (!given) continue;
     warnings.push_back(fmt::format("walk.{} has no effect without walk.quasi_static=true", name));

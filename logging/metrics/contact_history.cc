@@ -9,6 +9,8 @@ namespace {
 
 // A reading beyond this many standard deviations of its noise is a load.
 constexpr double kNoiseDeviations = 5;
+// m from its reference's end, beyond which a contact is reported as early or late.
+constexpr double kExpectedWithin = 0.02;
 
 std::array<bool, 2> Contacts(const std::vector<int8_t>& in_contact) {
   return {in_contact[0] != 0, in_contact[1] != 0};
@@ -48,9 +50,9 @@ class ReferenceEnds {
   void Place(const support_plan_t& plan, TouchDown* touch) const {
     if (!end_[touch->foot]) return;
     touch->above_end = Height(plan, touch->foot) - *end_[touch->foot];
-    touch->timing = *touch->above_end > schedule_->expected_within    ? Timing::kEarly
-                    : *touch->above_end < -schedule_->expected_within ? Timing::kLate
-                                                                      : Timing::kExpected;
+    touch->timing = *touch->above_end > kExpectedWithin    ? Timing::kEarly
+                    : *touch->above_end < -kExpectedWithin ? Timing::kLate
+                                                           : Timing::kExpected;
   }
 
  private:

@@ -13,7 +13,7 @@ namespace {
 constexpr double kCopShare = 0.25;
 // A touch-down by the true load: as ContactConfirmation's defaults have it.
 constexpr double kTrueTouchLoad = 10, kTrueTouchTime = 0.02;  // N, s
-// N: below it, as long, nothing was touched (ContactConfirmation's release_load).
+// N: below it, as long, nothing was touched (LoadLevels' release).
 constexpr double kNoLoad = 4;
 constexpr double kWrenchNeesBound = 21.026;  // chi-squared, 12 degrees of freedom, 5 %
 

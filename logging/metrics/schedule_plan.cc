@@ -155,7 +155,6 @@ std::optional<SchedulePlan> ReadSchedulePlan(const RunRecord& run) {
   if (message == nullptr) return {};  // the figures of such a log stand without the plan
   const Reader reader(*message);
   SchedulePlan plan;
-  plan.expected_within = reader.Part("contact").Real("expected_within");
   for (int i = 0; i < reader.Size("phase"); ++i) {
     plan.phases.push_back(ReadPhase(reader.Element("phase", i)));
   }

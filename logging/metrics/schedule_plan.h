@@ -27,7 +27,6 @@ struct PhasePlan {
 
 struct SchedulePlan {
   std::vector<PhasePlan> phases;
-  double expected_within = 0;  ///< m, a contact further from its reference's end is early or late
 };
 
 /// Reads the schedule of the component that writes SUPPORT_PLAN. Empty when the run names no such

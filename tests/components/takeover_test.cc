@@ -13,7 +13,7 @@
 namespace poise {
 namespace {
 
-constexpr int kNumTicks = 550;
+constexpr int kNumTicks = 685;
 
 // From both feet to the right one, the left foot up, down, searched for, found, loaded; then no
 // task, then tasks again.
@@ -24,8 +24,7 @@ std::string Phases(robot::TestRobot robot) {
           ? "transition { kind: UNLOAD foot: LEFT_FOOT delay: 0.1 duration: 0.1 }"
           : "";
   return std::string(R"(
-  contact { settle_duration: 0.03 }
-  hip_strategy { enabled: true start: 0.02 tilt: 0.05 tilt_time: 0.1 }
+  hip_strategy { enabled: true }
   phase { duration: 0.25 com { target: SHIFT x: 0.01 duration: 0.2 } )") +
          unload + R"( }
   phase { duration: 0.15 support: RIGHT foot { foot: LEFT_FOOT z: 0.04 duration: 0.1 } }

@@ -282,11 +282,6 @@ TEST_F(EventsTest, AContactNearTheReferencesEndIsAsExpected) {
   }
   EXPECT_EQ(Named("touch_down").size(), 1u);
   EXPECT_TRUE(Named("contact_early").empty());
-  // What counts as expected is the configuration's.
-  config.mutable_contact()->set_expected_within(0.004);
-  spec_.clear_config();
-  Plan(config);
-  EXPECT_EQ(Named("contact_early").size(), 1u);
 }
 
 TEST_F(EventsTest, AReferenceWithoutHeightEndsBelowWhereItBegan) {

@@ -22,7 +22,7 @@ using stepping::Crossing;
 stepping::StepChoice Choice() {
   const robot::RobotModel model =
       robot::LoadRobotFiles(POISE_SOURCE_DIR "/deploy/robots/dyros/dyros_legs.pbtxt", nullptr);
-  return MakeStepChoice(RecoveryConfig(), model);
+  return MakeStepChoice(model);
 }
 
 /// Where the ray leaves a convex polygon that its start lies in, by bisection.
@@ -58,7 +58,8 @@ TEST(FarthestSupport, IsTheFarthestOfFootholdsDrawnAtRandom) {
       // In axes of the stance sole.
       const Vector2d com = -draw(reach.Leg(stance, 1));
       const auto footholds = reach.Footholds(
-          foot, com, std::array{Crossing::kNone, Crossing::kInFront, Crossing::kBehind}[random() % 3]);
+          foot, com,
+          std::array{Crossing::kNone, Crossing::kInFront, Crossing::kBehind}[random() % 3]);
       if (footholds.num_corners == 0) continue;
       const Vector2d foothold = draw(footholds);
       const auto landed =

@@ -43,13 +43,15 @@ class Step {
       : model_(model),
         height_(robot::StandingHeight(model)),
         spec_(MakeRecoverySpec({}, {}, model, -1)),
-        limits_(MakeStepChoice({}, model).limits()),
+        limits_(MakeStepChoice(model).limits()),
         nominal_(stance.joint_position) {}
 
   /// s. The other foot leaves as the landed one has half of the load.
-  double both() const { return 0.5 * spec_.load; }
+  double both() const { return 0.5 * stepping::Recovery::kLoad; }
   double single() const {
-    return spec_.stride * std::sqrt((height_ - spec_.walk_lowering) / robot::kGravity) - both();
+    return stepping::Recovery::kStride *
+               std::sqrt((height_ - spec_.walk_lowering) / robot::kGravity) -
+           both();
   }
 
   /// The robot on the sole of `stance`, whose frame lies at the origin, at each sample, with its
@@ -64,7 +66,7 @@ class Step {
     from.position = across - ahead;
     swing.Begin(from, Eigen::Matrix3d::Identity(), across + ahead,
                 Eigen::AngleAxisd(turn, Vector3d::UnitZ()).toRotationMatrix(), 0, single(),
-                spec_.swing);
+                stepping::Recovery::kSwing);
     const double com_height = height_ - spec_.walk_lowering;
     const double omega = std::sqrt(robot::kGravity / com_height);
     const Orbit sagittal(omega, single(), both(), 0.5 * length, false);

@@ -93,8 +93,7 @@ std::optional<PushBound> BoundOf(const Push& push, const Scenario& scenario,
   bound.lip_impulse_of_duration =
       bound.lip_impulse / PendulumShare(push.profile(), push.duration(), frequency);
   if (step_time) {
-    const stepping::StepChoice choice =
-        MakeStepChoice(scenario.step_planner().recovery(), run.robot);
+    const stepping::StepChoice choice = MakeStepChoice(run.robot);
     for (const robot::Foot foot : robot::kFeet) {
       if (truth->foot_contact_points[robot::Index(foot)] == 0) continue;
       const Eigen::Isometry3d sole = GetPose(truth->foot_pose[robot::Index(foot)]);

@@ -6,8 +6,8 @@
 
 namespace poise {
 
-/// Lost once a foot that is to carry has measured less than release_load for kLostDuration; no
-/// longer with the first measurement above, or when it is not to carry any more.
+/// Lost once a foot that is to carry has measured less than LoadLevels' release for kLostDuration;
+/// no longer with the first measurement above, or when it is not to carry any more.
 class ContactLoss {
  public:
   /// s; longer than the rattle of a foot that a push rocks.

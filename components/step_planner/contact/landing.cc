@@ -79,8 +79,7 @@ void Landing::Measure(double time, double load, double deviation) {
 bool Landing::confirmed() const {
   if (!touch_.touching()) return false;
   if (state_ == State::kSwing) return !left_;
-  return state_ == State::kTouching &&
-         time_ - touched_ >= spec_.settle - kTimeTolerance;
+  return state_ == State::kTouching && time_ - touched_ >= spec_.settle - kTimeTolerance;
 }
 
 bool Landing::SearchBegins(bool before_touch_down, bool due) const {

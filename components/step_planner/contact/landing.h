@@ -19,7 +19,9 @@ struct LandingSpec {
   double observed_load = 0;  ///< N that an observed load must be above at least to be contact
   /// s that a load must last, or its loss: ten periods of 500 Hz, longer than the sensor's noise.
   double touch_duration = 0.02;
-  double settle = 0;        ///< s from the touch until the foot counts as a contact
+  /// s from the touch until the foot counts as a contact, three times relax_time: what the lowering
+  /// presses with is given back first, so that the model's change makes no step of the torque.
+  double settle = 0.3;
   double search_depth = 0;  ///< m that it goes on downward at most
   /// m/s, with which it does: slow enough that the load stops it before it tips the robot.
   double search_speed = 0.03;
@@ -31,14 +33,16 @@ struct LandingSpec {
 
 /// N: the loads of a landing, raised where the load is not known so well.
 struct LoadLevels {
-  double touch = 0, release = 0, press = 0;
+  double touch = 0;    ///< contact is made above it
+  double release = 0;  ///< and lost below it
+  double press = 0;    ///< at which a search comes to a stand
 
   /// `deviation`: N, of an observed load; 0 of a measured one, whose noise the loads allow for.
   LoadLevels(const LandingSpec& spec, double deviation);
 };
 
 /// Contact from a measured load, with hysteresis: it is made when the load has stayed above
-/// touch_load for a duration, and lost when it has stayed below release_load as long.
+/// `touch` for a duration, and lost when it has stayed below `release` as long.
 class TouchDetector {
  public:
   /// `duration`: s that either must last.
@@ -60,10 +64,10 @@ class TouchDetector {
 ///
 /// Searching: the reference goes on downward at search_speed · (1 − load / press_load), which
 /// presses until contact counts in spite of joint friction, and never much harder.
-/// Touching: the foot is let go, or pressed in z. Its reference comes to where the sole stands, so that the task
-/// asks for no acceleration and is a damper only: the sole settles flat, yields to a surface that
-/// rises, and the change of the model's contact makes no step of the torque. In z this is mixed
-/// with the search, by the load from touch_load (let go) down to release_load (search), so that
+/// Touching: the foot is let go, or pressed in z. Its reference comes to where the sole stands, so
+/// that the task asks for no acceleration and is a damper only: the sole settles flat, yields to a
+/// surface that rises, and the change of the model's contact makes no step of the torque. In z this
+/// is mixed with the search, by the load from `touch` (let go) down to `release` (search), so that
 /// contact stays measured when no joint friction holds the foot down.
 class Landing {
  public:

@@ -34,9 +34,7 @@ class FootMotion {
   const Swing& swing() const { return swing_; }
   const PointMotion& reference() const { return reference_; }  ///< of the sole's centre
   const RotationMotion& rotation() const { return rotation_; }
-  void Archive(StateArchive* archive) {
-    archive->Show(swing_, landing_, reference_, rotation_);
-  }
+  void Archive(StateArchive* archive) { archive->Show(swing_, landing_, reference_, rotation_); }
 
  private:
   Swing swing_;

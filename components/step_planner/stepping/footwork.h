@@ -27,7 +27,7 @@ struct StepInput {
   /// The body is turned by `lean` (rad) from where it is to be, and turns with `turning` (rad/s).
   Eigen::Vector3d lean = Eigen::Vector3d::Zero(), turning = Eigen::Vector3d::Zero();
   FootArray<Eigen::Isometry3d> sole{Eigen::Isometry3d::Identity(), Eigen::Isometry3d::Identity()};
-  FootArray<double> load{0, 0};  ///< N
+  FootArray<double> load{0, 0};            ///< N
   FootArray<double> load_deviation{0, 0};  ///< N, standard deviation of an observed load; else 0
   FootArray<bool> in_contact{true, true};  ///< of the plan; while no step is under way
   PointMotion free_foot;                   ///< reference of a foot in the air; likewise
@@ -68,7 +68,7 @@ struct StepOutput {
   PointMotion swing;
   RotationMotion swing_rotation;
   Landing::State foot_state = Landing::State::kSwing;  ///< of the foot in the air
-  Eigen::Vector2d cop = Eigen::Vector2d::Zero();  ///< m, world, that is wanted
+  Eigen::Vector2d cop = Eigen::Vector2d::Zero();       ///< m, world, that is wanted
   /// m, world, on the ground: the centre of pressure that `com` follows, `cop` less the observed
   /// offset of the pendulum.
   Eigen::Vector3d cop_reference = Eigen::Vector3d::Zero();

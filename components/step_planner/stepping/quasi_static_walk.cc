@@ -43,7 +43,7 @@ QuasiStaticWalk::QuasiStaticWalk(const StepChoice& choice, const QuasiStaticSpec
       heading_(spec.yaw_rate),
       pressed_(spec.height_rate),
       sole_{PressedSole(choice.foot(Foot::kRight)), PressedSole(choice.foot(Foot::kLeft))},
-      ramp_start_(RampStart(spec.press_share)) {}
+      ramp_start_(RampStart(kPressShare)) {}
 
 double RampStart(double share) {
   double low = 0, high = 1;
@@ -152,7 +152,7 @@ bool QuasiStaticWalk::Update(const StepInput& input, const WalkCommand& command)
 
 void QuasiStaticWalk::Start(const StepInput& input, const StepState& state,
                             const WalkCommand& command) {
-  command_ = Approach({}, command, spec_.acceleration * spec_.period(),
+  command_ = Approach({}, command, kAcceleration * spec_.period(),
                       spec_.turn_acceleration * spec_.period());
   starting_ = true;
   stance_ = Other(FirstFoot(command));
@@ -226,13 +226,13 @@ void QuasiStaticWalk::Land(const StepInput& input, const StepState& state,
   sinks_[foot] =
       std::min(ExpectedSinking(sole_[foot].Sunk(input.sole[foot]), input.load[foot], spec_.weight),
                spec_.most_sinking);
-  const double haste = spec_.sink_speed * (spec_.load + spec_.unload);
+  const double haste = kSinkSpeed * (spec_.load + spec_.unload);
   slower_ = sinks_[foot] > haste ? sinks_[foot] / haste : 1;
   course_ = Next(course_, foot);
   stance_ = foot;
   steps_.Land(input.time, input.time + slower_ * spec_.load);
   Enter(Stage::kLoading, input.time);
-  command_ = Approach(command_, command, spec_.acceleration * spec_.period(),
+  command_ = Approach(command_, command, kAcceleration * spec_.period(),
                       spec_.turn_acceleration * spec_.period());
   if (command_.stepping) {
     PlanSteps(NextOnCourse({state.sole[stance_], state.sole_yaw[stance_]}, Other(stance_)),
@@ -334,7 +334,7 @@ Vector2d QuasiStaticWalk::DesiredCop(const StepInput& input, const StepState& st
   const Vector2d cop = WantedCop(state, time);
   const Vector2d error = state.pendulum.capture_point() - wanted_;
   const balance::ConvexPolygon carrying = Carrying(input, state, cop);
-  const Vector2d asked = balance::NearestPoint(carrying, cop + (1 + spec_.gain) * error);
+  const Vector2d asked = balance::NearestPoint(carrying, cop + (1 + kGain) * error);
   // A foot that lands at another time than planned makes no step of it.
   if (since_ == time && stage_ != Stage::kShifting) left_over_ = output_.cop - asked;
   const double left = 1 - balance::SmoothStep((time - since_) / kBlend);
@@ -406,7 +406,7 @@ void QuasiStaticWalk::Lead(const StepInput& input, const StepState& state) {
   // A foot that is pressed carries: the sole of the other one shall do so by its middle still.
   const bool presses = stage_ == Stage::kTouching;
   const double share = stage_ == Stage::kSwinging ? 0 : presses ? Loaded(input) : 1;
-  pressed_.Follow(share * spec_.press_share, period);
+  pressed_.Follow(share * kPressShare, period);
   const Foot s = stance_;
   double height = Height(input, state);
   if (!spec_.ground.empty()) height = std::min(height, HighestForStep(input, state));

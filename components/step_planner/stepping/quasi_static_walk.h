@@ -21,16 +21,14 @@ struct QuasiStaticSpec {
   double swing = 0;   ///< s
   double load = 0;    ///< s of the ramp that loads it again
   FootstepLimits step;
-  double acceleration = 0, turn_acceleration = 0;  ///< m/s², rad/s², of what is commanded
+  double turn_acceleration = 0;  ///< rad/s², with which a turn rate is approached
   SwingSpec foot;
   LandingSpec landing;
-  double gain = 0;                            ///< of the capture point's error, > 0
-  double most_offset = 0;                     ///< m, of the pendulum's observed offset
-  double com_lowering = 0;                    ///< m below standing at which it walks
+  double most_offset = 0;                ///< m, of the pendulum's observed offset
+  double com_lowering = 0;               ///< m below standing at which it walks
   double height_rate = 0, yaw_rate = 0;  ///< 1/s, with which height and heading of the body follow
   /// The robot is still: m from the soles' middle to the capture point, m/s of the COM, s of both.
   double still_distance = 0, still_speed = 0, still_time = 0;
-  double press_share = 0;        ///< of the weight, with which a foot that has touched is pressed
   double lift_off_distance = 0;  ///< m from the stance sole's middle to the capture point, at most
   double most_return = 0;        ///< m, rad by which a foothold comes back to the course at most
   KnownGround ground;
@@ -41,7 +39,6 @@ struct QuasiStaticSpec {
   double most_sinking = 0;  ///< m that a sole is expected to sink at most
   double most_ahead = 0;    ///< m by which the COM goes down at most before the stance sole does
   double soft = 0;          ///< m of sinking under the weight, above which ground counts as soft
-  double sink_speed = 1;    ///< m/s of a sole's sinking, on average over the ramps: above 0
 
   /// s from touch-down to touch-down.
   double period() const { return unload + swing + landing.settle + load; }
@@ -53,6 +50,13 @@ double RampStart(double share);
 /// Pure function of its calls; never allocates.
 class QuasiStaticWalk {
  public:
+  /// Share of the weight with which a foot that has touched is pressed down, so that the sole lies
+  /// down on what it has found. More than 0.4 would lift the other foot off its middle.
+  static constexpr double kPressShare = 0.1;
+  /// m/s that a sole sinks on average while it is loaded: the paper's robot loads as fast on 10
+  /// kN/m as on hard ground.
+  static constexpr double kSinkSpeed = 0.04;
+
   QuasiStaticWalk() = default;
   QuasiStaticWalk(const StepChoice& choice, const QuasiStaticSpec& spec);
 
@@ -64,8 +68,7 @@ class QuasiStaticWalk {
   int num_steps() const { return num_steps_; }  ///< feet that have landed, since the start
   /// Steps begun since the start, the one under way too.
   int num_begun() const {
-    const bool under_way =
-        active() && stage_ != Stage::kLoading && stage_ != Stage::kCatching;
+    const bool under_way = active() && stage_ != Stage::kLoading && stage_ != Stage::kCatching;
     return num_steps_ + (under_way ? 1 : 0);
   }
   Foot stepping_foot() const { return Other(stance_); }  ///< that is in the air, or the next to be
@@ -110,9 +113,7 @@ class QuasiStaticWalk {
   /// The unloading ramp, no sooner than the centre of pressure goes over.
   void Unload(const StepState& state, double period);
   void Land(const StepInput& input, const StepState& state, const WalkCommand& command);
-  bool OnOneFoot() const {
-    return stage_ == Stage::kSwinging || stage_ == Stage::kTouching;
-  }
+  bool OnOneFoot() const { return stage_ == Stage::kSwinging || stage_ == Stage::kTouching; }
   bool AtRest(const StepInput& input, const StepState& state);
   /// The steps to come: the next one is to `first`, its foot is unloaded from `unload` on, s.
   void PlanSteps(const Foothold& first, double unload);
@@ -143,6 +144,14 @@ class QuasiStaticWalk {
   /// steps.
   bool OnSoftGround() const;
   void Lead(const StepInput& input, const StepState& state);
+
+  // m/s² with which a commanded velocity is approached: a hundredth of g, on any robot.
+  static constexpr double kAcceleration = 0.1;
+  // s of contact.touch_load that are a landing: a hard sole bounces as long on any robot.
+  static constexpr double kTouchDuration = 0.002;
+  // Ratio: by this share of the capture point's error the centre of pressure goes beyond it, so
+  // that the error decays at this times ω.
+  static constexpr double kGain = 0.5;
 
   StepChoice choice_;
   QuasiStaticSpec spec_;

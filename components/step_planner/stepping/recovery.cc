@@ -61,8 +61,7 @@ bool Recovery::Update(const StepInput& input) {
   const double excess = Excess(state);
   Watch(time, excess);
   const double period = TickPeriod(time - time_);
-  command_ = Approach(command_, input.command, period * spec_.acceleration,
-                      period * spec_.turn_acceleration);
+  command_ = Approach(command_, input.command, period * kAcceleration, period * kTurnAcceleration);
   switch (stage_) {
     case Stage::kStanding: {
       turns_ = false;
@@ -74,13 +73,13 @@ bool Recovery::Update(const StepInput& input) {
       }
       if (StepPlan plan; need == StepReason::kNone && TogetherNow(input, state, &plan)) {
         together_asked_ = false;
-        together_at_ = -1;
         plan_ = plan;
         reason_ = StepReason::kTogether;
         BeginShift(input, state);
       }
       step_helps_ = true;
-      if (spec_.watched_margin >= 0 && stage_ == Stage::kStanding && excess > -spec_.watched_margin) {
+      if (spec_.watched_margin >= 0 && stage_ == Stage::kStanding &&
+          excess > -spec_.watched_margin) {
         const StepPlan plan = choice_.Choose(state);
         step_helps_ = plan.possible && choice_.Helps(state, plan);
       }
@@ -128,9 +127,8 @@ bool Recovery::Update(const StepInput& input) {
       } else if (AtRest(input, state)) {
         stage_ = Stage::kStanding;
         const bool caught = reason_ != StepReason::kTogether;
-        if (caught && spec_.together_after > 0) together_at_ = time + spec_.together_after;
         // A walk ends with the feet side by side.
-        if (caught && turns_) together_at_ = time;
+        if (caught && turns_) together_asked_ = true;
       }
       break;
   }
@@ -172,11 +170,11 @@ double Recovery::UnloadTime() const {
 }
 
 double Recovery::LoadTime() const {
-  return reason_ == StepReason::kTogether ? kTogetherRamp : spec_.load;
+  return reason_ == StepReason::kTogether ? kTogetherRamp : kLoad;
 }
 
 bool Recovery::TogetherNow(const StepInput& input, const StepState& state, StepPlan* plan) {
-  if (!together_asked_ && !(together_at_ >= 0 && input.time >= together_at_)) {
+  if (!together_asked_) {
     moving_since_ = input.time;
     return false;
   }
@@ -188,7 +186,6 @@ bool Recovery::TogetherNow(const StepInput& input, const StepState& state, StepP
     const double way = (beside.foothold - state.sole[foot]).norm();
     if (way < kTogetherDistance) {
       together_asked_ = false;
-      together_at_ = -1;
       return false;
     }
     // Straight rather than around the other leg.
@@ -268,7 +265,7 @@ bool Recovery::LiftOff(const StepInput& input, const PointMotion& from,
   in_contact_[plan_.foot] = false;
   steps_.first().lift_off = input.time;
   const double ground = input.sole[Other(plan_.foot)].translation().z();
-  foot_.LiftOff(from, rotation, steps_.first(), ground, ground, spec_.swing, input.time);
+  foot_.LiftOff(from, rotation, steps_.first(), ground, ground, kSwing, input.time);
   stage_ = Stage::kSwinging;
   since_ = input.time;
   cop_from_ = output_.cop;
@@ -312,7 +309,7 @@ void Recovery::Replan(const StepInput& input, const StepState& state) {
     Hurry(state, input.time);
   }
   const double left = steps_.first().touch_down - input.time;
-  if (!(left > spec_.swing.freeze)) return;
+  if (!(left > kSwing.freeze)) return;
   const bool walks = reason_ == StepReason::kWalk;
   const StepPlan next = walks ? choice_.StrideAt(state, plan_.foot, gait(state), left)
                               : choice_.At(state, plan_.foot, left, plan_.crossing);
@@ -364,7 +361,7 @@ Vector2d Recovery::PointFor(const StepInput& input, const StepState& state,
   const Vector2d body = ForBody(input, budget);
   const Vector2d lead = velocity / state.pendulum.frequency;
   const bool gently = stage_ == Stage::kShifting || reason_ == StepReason::kTogether;
-  const double gain = gently ? std::max(spec_.gain, kTogetherGain) : spec_.gain;
+  const double gain = gently ? std::max(kGain, kTogetherGain) : kGain;
   return balance::NearestPoint(support, point - lead + gain * (point - goal) + body) - body;
 }
 
@@ -473,10 +470,9 @@ void Recovery::LeadCom(const StepInput& input, const StepState& state) {
 
 void Recovery::Archive(StateArchive* archive) {
   archive->Show(stage_, reason_, num_steps_, steps_now_, in_contact_, plan_, steps_, foot_, height_,
-                outside_, near_edge_, time_, since_, ramp_from_, stays_outside_,
-                stays_near_edge_, excess_at_edge_, moving_since_, cop_from_, standing_height_,
-                together_asked_, together_at_, shift_from_, step_helps_, command_, turns_, heading_,
-                stride_, output_);
+                outside_, near_edge_, time_, since_, ramp_from_, stays_outside_, stays_near_edge_,
+                excess_at_edge_, moving_since_, cop_from_, standing_height_, together_asked_,
+                shift_from_, step_helps_, command_, turns_, heading_, stride_, output_);
 }
 
 }  // namespace poise::stepping

@@ -20,15 +20,14 @@ constexpr double kMoved = 0.08;
 }  // namespace
 
 Gait Recovery::gait(const StepState& state) const {
-  const double transfer = 0.5 * spec_.load;
+  const double transfer = 0.5 * kLoad;
   if (command_.period > 0) {
     const StepLimits& limits = choice_.limits();
     const double least = limits.unload + limits.least_swing + transfer;
     const double most = std::max(least, kLongestStride / state.pendulum.frequency);
-    return {command_, std::clamp(command_.period, least, most), transfer, spec_.gain};
+    return {command_, std::clamp(command_.period, least, most), transfer, kGain};
   }
-  return {stride_.Corrected(command_), spec_.stride / state.pendulum.frequency, transfer,
-          spec_.gain};
+  return {stride_.Corrected(command_), kStride / state.pendulum.frequency, transfer, kGain};
 }
 
 StepPlan Recovery::WalkOn(const StepState& state, Foot foot, double unload,
@@ -46,7 +45,7 @@ Vector2d Recovery::WalkingPoint(const StepInput& input, const StepState& state, 
                                 const balance::ConvexPolygon& support, double left) const {
   const Vector2d body = ForBody(input, kSwingBudget);
   StepState with = state;
-  with.pendulum.com += body / (1 + spec_.gain);
+  with.pendulum.com += body / (1 + kGain);
   return choice_.StridePoint(with, stance, gait(state), left, support) - body;
 }
 

@@ -5,10 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <string>
-
-#include "components/framework/configuration/configuration.h"
-#include "components/framework/configuration/field_rules.h"
 
 namespace poise {
 namespace {
@@ -18,12 +14,6 @@ using State = HipStrategy::State;
 
 constexpr double kTick = 0.002;
 
-HipStrategyConfig Config() {
-  HipStrategyConfig config;
-  config.set_enabled(true);
-  return config;
-}
-
 // Pushed along +x: ξ' = ω (ξ − p − I α / (m g)), with the centre of pressure p at the edge while ξ
 // needs it there and under ξ before. The robot's figures, and its tilting body's effective inertia.
 class Pendulum {
@@ -31,8 +21,6 @@ class Pendulum {
   static constexpr double kMass = 55, kGravity = 9.81, kHeight = 0.75, kInertia = 1.4;
   static constexpr double kEdge = 0.15;  // m
   static constexpr int kSteps = 50;      // in a tick
-
-  explicit Pendulum(const HipStrategyConfig& config) : hip_(config) {}
 
   static double frequency() { return std::sqrt(kGravity / kHeight); }
   // Moment pivot's shift per acceleration, m/(rad/s²).
@@ -43,7 +31,7 @@ class Pendulum {
     double x = capture_point;
     for (int tick = 0; tick < 3000; ++tick) {
       const double time = kTick * tick;
-      double excess = x - (kEdge - Config().start());
+      double excess = x - (kEdge - HipStrategy::kStart);
       const PointMotion tilt = hip_.Update(
           {.time = time, .excess = Vector3d(std::max(excess, 0.0), 0, 0), .margin = -excess});
       largest_tilt_ = std::max(largest_tilt_, tilt.position.y());
@@ -64,67 +52,55 @@ class Pendulum {
   double largest_tilt_ = 0;
 };
 
-double LargestCaptured(const HipStrategyConfig& config) {
+TEST(HipStrategy, CaptureRegionGrowsByTheFlywheelsShare) {
+  // ω I / (m g) ∫ α e^{−ωt} dt over the turn of minimum jerk, by its acceleration's formula. The
+  // return comes when the capture point is back and takes nothing.
+  const double tilt = HipStrategy::kTilt, tilt_time = HipStrategy::kTiltTime;
+  double integral = 0;
+  constexpr int kPieces = 10000;
+  for (int i = 0; i < kPieces; ++i) {
+    const double s = (i + 0.5) / kPieces;
+    const double acceleration =
+        tilt / (tilt_time * tilt_time) * (60 * s - 180 * s * s + 120 * s * s * s);
+    integral +=
+        acceleration * std::exp(-Pendulum::frequency() * s * tilt_time) * tilt_time / kPieces;
+  }
+  const double growth = Pendulum::frequency() * Pendulum::lever() * integral;
+  ASSERT_GT(growth, 0.003);
   double inside = 0, outside = 1;
   while (outside - inside > 1e-6) {
     const double middle = 0.5 * (inside + outside);
-    (Pendulum(config).Captures(middle) ? inside : outside) = middle;
+    (Pendulum().Captures(middle) ? inside : outside) = middle;
   }
-  return inside;
-}
-
-TEST(HipStrategy, CaptureRegionGrowsByTheFlywheelsShare) {
-  HipStrategyConfig config = Config();
-  config.set_tilt(0);
-  EXPECT_NEAR(LargestCaptured(config), Pendulum::kEdge, 1e-4);
-  for (const double tilt : {0.3, 0.6}) {
-    for (const double tilt_time : {0.2, 0.35}) {
-      config.set_tilt(tilt);
-      config.set_tilt_time(tilt_time);
-      // ω I / (m g) ∫ α e^{−ωt} dt over the turn of minimum jerk, by its acceleration's formula.
-      // The return comes when the capture point is back and takes nothing.
-      double integral = 0;
-      constexpr int kPieces = 10000;
-      for (int i = 0; i < kPieces; ++i) {
-        const double s = (i + 0.5) / kPieces;
-        const double acceleration =
-            tilt / (tilt_time * tilt_time) * (60 * s - 180 * s * s + 120 * s * s * s);
-        integral +=
-            acceleration * std::exp(-Pendulum::frequency() * s * tilt_time) * tilt_time / kPieces;
-      }
-      const double growth = Pendulum::frequency() * Pendulum::lever() * integral;
-      ASSERT_GT(growth, 0.003);
-      // A tick's reference is held over the tick.
-      EXPECT_NEAR(LargestCaptured(config), Pendulum::kEdge + growth, 0.02 * growth);
-    }
-  }
+  // A tick's reference is held over the tick.
+  EXPECT_NEAR(inside, Pendulum::kEdge + growth, 0.02 * growth);
 }
 
 TEST(HipStrategy, TurnsOnceAndComesBack) {
-  Pendulum pendulum(Config());
+  Pendulum pendulum;
   EXPECT_TRUE(pendulum.Captures(Pendulum::kEdge));
-  EXPECT_NEAR(pendulum.largest_tilt(), Config().tilt(), 1e-9);
+  EXPECT_NEAR(pendulum.largest_tilt(), HipStrategy::kTilt, 1e-9);
   EXPECT_EQ(pendulum.state(), State::kUpright);
-  Pendulum small(Config());
-  EXPECT_TRUE(small.Captures(Pendulum::kEdge - Config().start() - 0.001));
+  Pendulum small;
+  EXPECT_TRUE(small.Captures(Pendulum::kEdge - HipStrategy::kStart - 0.001));
   EXPECT_EQ(small.largest_tilt(), 0);
 }
 
 TEST(HipStrategy, TheHeadFollowsTheCapturePoint) {
   for (int i = 0; i < 16; ++i) {
-    HipStrategy hip(Config());
+    HipStrategy hip;
     const double angle = i * std::acos(-1.0) / 8;
     const Vector3d direction(std::cos(angle), std::sin(angle), 0);
     hip.Update({.time = 0, .excess = 0.01 * direction, .margin = -0.01});
     const Vector3d tilt = hip.Update({.time = 1, .excess = 0.01 * direction}).position;
-    EXPECT_NEAR(tilt.norm(), Config().tilt(), 1e-12);
+    EXPECT_NEAR(tilt.norm(), HipStrategy::kTilt, 1e-12);
     const Vector3d head = Eigen::AngleAxisd(tilt.norm(), tilt.normalized()) * Vector3d::UnitZ();
-    EXPECT_NEAR(head.dot(direction), std::sin(Config().tilt()), 1e-12);
+    EXPECT_NEAR(head.dot(direction), std::sin(HipStrategy::kTilt), 1e-12);
   }
 }
 
 TEST(HipStrategy, BrakesBeforeAJointsLimit) {
-  HipStrategy hip(Config());
+  HipStrategy hip;
   const Vector3d excess(0, 0.01, 0);
   for (int tick = 0; tick < 60; ++tick) hip.Update({.time = kTick * tick, .excess = excess});
   const PointMotion before =
@@ -144,7 +120,7 @@ TEST(HipStrategy, BrakesBeforeAJointsLimit) {
 }
 
 TEST(HipStrategy, AnotherPushOnTheWayBackTurnsItAgainWithoutAStep) {
-  HipStrategy hip(Config());
+  HipStrategy hip;
   PointMotion last;
   double turned = 0;
   for (int tick = 0; tick < 1500; ++tick) {
@@ -158,27 +134,9 @@ TEST(HipStrategy, AnotherPushOnTheWayBackTurnsItAgainWithoutAStep) {
     last = now;
     if (tick > 500) turned = std::max(turned, now.position.y());
   }
-  EXPECT_NEAR(turned, Config().tilt(), 1e-3);
+  EXPECT_NEAR(turned, HipStrategy::kTilt, 1e-3);
   EXPECT_LT(last.position.norm(), 1e-12);
   EXPECT_EQ(hip.state(), State::kUpright);
-}
-
-TEST(HipStrategy, RefusesWhatCannotWork) {
-  const auto field_of = [](const auto& change) -> std::string {
-    HipStrategyConfig config;
-    change(&config);
-    try {
-      CheckFields(config, "hip_strategy.");
-    } catch (const ConfigError& error) {
-      return error.field();
-    }
-    return "accepted";
-  };
-  EXPECT_EQ(field_of([](auto*) {}), "accepted");
-  EXPECT_EQ(field_of([](auto* c) { c->set_tilt(-0.1); }), "hip_strategy.tilt");
-  EXPECT_EQ(field_of([](auto* c) { c->set_tilt(NAN); }), "hip_strategy.tilt");
-  EXPECT_EQ(field_of([](auto* c) { c->set_tilt_time(0); }), "hip_strategy.tilt_time");
-  EXPECT_EQ(field_of([](auto* c) { c->set_start(-1); }), "hip_strategy.start");
 }
 
 }  // namespace

@@ -62,8 +62,7 @@ class Foot {
   static constexpr double kStiction = 1e5, kDrag = 300;        // N/m, N·s/m, joints
   static constexpr int kSteps = 40;                            // in a tick
 
-  Foot(const LandingSpec& config, double z, double friction)
-      : landing(config), z_(z), anchor_(z), friction_(friction) {
+  Foot(double z, double friction) : z_(z), anchor_(z), friction_(friction) {
     reference.position.z() = z;
     scenario_ = reference;
     landing.LiftOff(z);
@@ -115,7 +114,7 @@ class Foot {
   }
   double z() const { return z_; }
 
-  Landing landing;
+  Landing landing{Shipped()};
   PointMotion reference;
   double time = 0, load = 0, acceleration = 0, lowest = 1, largest_load = 0;
 
@@ -127,8 +126,8 @@ class Foot {
 };
 
 // Lifted by 0.12 m, then lowered to 0.085 m in 2 s.
-Foot Lowered(double surface, double friction = 8, const LandingSpec& config = Shipped()) {
-  Foot foot(config, 0, friction);
+Foot Lowered(double surface, double friction = 8) {
+  Foot foot(0, friction);
   foot.Move(0.12, 2);
   foot.Run(3, 0, false);
   EXPECT_EQ(foot.landing.state(), State::kSwing);
@@ -204,7 +203,7 @@ TEST_P(LandingFriction, NoSurfaceEndsRetracted) {
 }
 
 TEST_P(LandingFriction, AFootInTheAirYieldsToASurfaceThatRises) {
-  Foot foot({}, 0, GetParam());
+  Foot foot(0, GetParam());
   foot.Move(0.12, 2);
   foot.Run(3, 0, false);
   foot.largest_load = 0;
@@ -238,7 +237,7 @@ TEST(Landing, ASurfaceThatGoesAwayIsSearchedForAgain) {
 }
 
 TEST(Landing, BeforeAnotherSingleSupportPhaseItRestsWhereTheSurfaceLeftIt) {
-  Foot foot(Shipped(), 0, 8);
+  Foot foot(0, 8);
   foot.Move(0.12, 2);
   foot.Run(3, 0, false);
   for (int i = 0; i < 500; ++i) foot.Step(0.105 + 0.02 * kTick * i, false, false);
@@ -250,14 +249,14 @@ TEST(Landing, BeforeAnotherSingleSupportPhaseItRestsWhereTheSurfaceLeftIt) {
 }
 
 TEST(Landing, OnlyALoweredFootSearchesByItself) {
-  Foot foot(Shipped(), 0, 8);
+  Foot foot(0, 8);
   foot.Move(0.12, 2);
   foot.Run(5, 0, true);
   EXPECT_EQ(foot.landing.state(), State::kSwing);
   foot.Step(0, true, true);  // double support is due: now it must come down
   EXPECT_EQ(foot.landing.state(), State::kSearching);
 
-  Foot lowered(Shipped(), 0, 8);
+  Foot lowered(0, 8);
   lowered.Move(0.12, 2);
   lowered.Run(3, 0, false);
   lowered.Move(0.085, 2);
@@ -295,7 +294,7 @@ TEST(Landing, AMoveUpwardTakesATouchingFootOff) {
 }
 
 TEST(Landing, ATapOnTheWayUpDoesNotEndTheMove) {
-  Foot foot(Shipped(), 0, 8);
+  Foot foot(0, 8);
   foot.Move(0.12, 2);
   foot.Run(0.5, 0, false);
   foot.Run(0.1, foot.z() + 0.005, false);  // something in the way, then gone

@@ -190,13 +190,6 @@ TEST(PhaseSchedule, DoubleSupportWaitsForTheFootThatComesDown) {
   EXPECT_EQ(schedule.state().phase, 2);
 }
 
-TEST(PhaseSchedule, TheScheduleAloneDecidesWhenNoConfirmationIsRequired) {
-  PhaseSchedule schedule = Schedule("contact { required: false } " + kThere);
-  for (int tick = 0; tick <= 1000; ++tick)
-    Advance(&schedule, kTick * tick, kOverBoth, kUnconfirmed);
-  EXPECT_EQ(schedule.state().phase, 2);
-}
-
 TEST(PhaseSchedule, OnlyDoubleSupportAfterSingleSupportNeedsConfirmation) {
   PhaseSchedule schedule = Schedule(
       "phase { duration: 0.1 } phase { duration: 0.1 } phase { duration: 0.1 support: LEFT } "

@@ -174,8 +174,10 @@ TEST(QuasiStaticWalk, GoesDownAndWaitsAsThePressLetsExpect) {
     ASSERT_TRUE(world.RunTo(Stage::kSwinging, command));
     // A spring that 200 of 500 N press by `depth` goes down by 2.5 times that under all of them.
     const double whole = depth * kWeight / kDownLoad;
-    EXPECT_GE(world.time() - start, std::max(whole / world.spec().sink_speed, 1.6) - 0.01) << depth;
-    EXPECT_LT(world.time() - start, std::max(whole / world.spec().sink_speed, 1.6) + 1.0) << depth;
+    EXPECT_GE(world.time() - start, std::max(whole / QuasiStaticWalk::kSinkSpeed, 1.6) - 0.01)
+        << depth;
+    EXPECT_LT(world.time() - start, std::max(whole / QuasiStaticWalk::kSinkSpeed, 1.6) + 1.0)
+        << depth;
     // The foot stands `depth` lower; three fifths of the load are still to come, of which
     // most_ahead counts. Above a sole that sinks the COM comes up as its leg reaches, 0.92 of a
     // straight one, as high as it stands at most.

@@ -39,13 +39,14 @@ class World {
  public:
   explicit World(TestRobot robot, double ground_there = 0)
       : World(robot, ground_there, Shipped(robot)) {}
+  /// `choice`: nullptr: the shipped one.
   World(TestRobot robot, double ground_there, const RecoverySpec& spec,
-        const RecoveryConfig& config = {})
+        const StepChoice* choice = nullptr)
       : model_(robot::LoadTestRobot(robot)),
         height_(robot::StandingHeight(model_)),
         spacing_(robot::StandingSpacing(model_)),
         ground_there_(ground_there) {
-    recovery_ = Recovery(MakeStepChoice(config, model_), spec);
+    recovery_ = Recovery(choice == nullptr ? MakeStepChoice(model_) : *choice, spec);
     com_ = {0, 0, height_};
     for (size_t i = 0; i < 2; ++i) {
       sole_[i] = Eigen::Translation3d(0, i == 0 ? -0.5 * spacing_ : 0.5 * spacing_, 0) *
@@ -425,12 +426,13 @@ TEST_P(RecoveryCase, TheFeetComeSideBySideWhenAsked) {
 TEST_P(RecoveryCase, APushWhileTheFeetComeTogetherJumpsNoLoad) {
   // Shorter steps than those of a COM that goes down as far as it ships: with feet farther apart
   // than they leave them hardly a push is caught on the way, by whatever foot.
-  RecoveryConfig config;
-  config.mutable_motion()->set_com_lowering(0.03);
+  const robot::RobotModel model = robot::LoadTestRobot(GetParam());
+  const StepChoice lower(model, Reach(model, robot::StandingHeight(model), 0.03, 0.1, 0.02),
+                         MakeStepChoice(model).limits());
   int hurried = 0, stood = 0;
   for (const double unloaded : {0.1, 0.5, 0.9}) {
     for (double degrees = 0; degrees < 360; degrees += 15) {
-      World world(GetParam(), 0, Shipped(GetParam()), config);
+      World world(GetParam(), 0, Shipped(GetParam()), &lower);
       const double rest = EdgeDistance(world, {1, 0}, 0);
       const double impulse = world.mass() * world.Frequency() * rest;
       world.Push({1.1 * impulse, 0});

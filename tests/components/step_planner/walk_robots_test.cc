@@ -21,8 +21,8 @@ namespace {
 
 using robot::TestRobot;
 using stepping::QuasiStaticWalk;
-using stepping::StepInput;
 using stepping::Stage;
+using stepping::StepInput;
 
 constexpr double kPeriod = 0.002;   // s
 constexpr double kStiffness = 1e5;  // N/m with which a foot presses below the ground
@@ -91,11 +91,8 @@ WalkConfig Enabled() {
 
 TEST(WalkDefaults, AreThePapersRobots) {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
-  const auto defaults = GroupDefault<StepMotion, WalkConfig>("motion");
   const QuasiStaticWalk walk = MakeQuasiStaticWalk(Enabled(), ContactConfirmation(), model);
-  // To the bit.
-  EXPECT_EQ(walk.period(),
-            defaults.unload() + defaults.swing() + defaults.settle() + defaults.load());
+  EXPECT_EQ(walk.period(), 0.8 + 1.1 + 0.2 + 0.8);  // to the bit
 }
 
 // Dynamic similarity: lengths go with the height h, times with √(h/g).
@@ -112,14 +109,6 @@ TEST(WalkDefaults, AreOneWalkInUnitsOfGravityAndHeight) {
               std::sqrt(ratio) * first.Until(Stage::kSwinging, kAhead), 2 * kPeriod);
   EXPECT_NEAR(second.walk().command().velocity.x(),
               std::sqrt(ratio) * first.walk().command().velocity.x(), 1e-12);
-
-  WalkConfig given = Enabled();
-  given.mutable_motion()->set_swing(0.5);
-  const QuasiStaticWalk walk = MakeQuasiStaticWalk(given, ContactConfirmation(), other);
-  EXPECT_NEAR(walk.period() - 0.5,
-              std::sqrt(ratio) *
-                  (first.walk().period() - GroupDefault<StepMotion, WalkConfig>("motion").swing()),
-              1e-12);
 }
 
 std::string RefusedField(const WalkConfig& config, const robot::RobotModel& model) {
@@ -139,21 +128,14 @@ TEST(WalkLimits, WhatTheLegsCannotDoIsRefused) {
     const char* field;
     double possible, impossible;
   };
-  for (const Case& c : {Case{"motion.com_lowering", 0.08, 0.8}, Case{"motion.gap", 0.1, 0.5},
-                        Case{"motion.clearance", 0.14, 3}, Case{"longest", 0.3, 9}}) {
+  for (const Case& c :
+       {Case{"gap", 0.1, 0.5}, Case{"clearance", 0.14, 3}, Case{"longest", 0.3, 9}}) {
     WalkConfig config = Enabled();
     SetField(&config, c.field, std::to_string(c.possible));
     EXPECT_EQ(RefusedField(config, model), "accepted") << c.field;
     SetField(&config, c.field, std::to_string(c.impossible));
     EXPECT_EQ(RefusedField(config, model), std::string("walk.") + c.field);
   }
-  RecoveryConfig recovery;
-  recovery.mutable_motion()->set_clearance(3);
-  EXPECT_THROW(MakeStepChoice(recovery, model), ConfigError);
-  recovery.mutable_motion()->set_clearance(0.05);
-  EXPECT_NO_THROW(MakeStepChoice(recovery, model));
-  recovery.mutable_motion()->set_gap(0.5);
-  EXPECT_THROW(MakeStepChoice(recovery, model), ConfigError);
 }
 
 /// The paper's robot whose hips turn a leg back by at most `limit`, rad.
@@ -205,7 +187,7 @@ robot::RobotModel WithAnkles(double limit) {
 TEST(WalkLimits, AStanceLegThatDoesNotComeBelowTheComIsNoFaultOfTheGap) {
   const robot::RobotModel model = WithAnkles(0.17);
   WalkConfig config = Enabled();
-  config.mutable_motion()->set_gap(0.01);
+  config.set_gap(0.01);
   EXPECT_EQ(RefusedField(config, WithAnkles(0.3)), "accepted");
   try {
     MakeQuasiStaticWalk(config, ContactConfirmation(), model);
@@ -276,12 +258,12 @@ TEST(WalkLimits, AVelocityThatNoStepReachesAndWhatHasNoEffectAreTold) {
   ASSERT_EQ(WalkWarnings(config, model).size(), 1);
   EXPECT_NE(WalkWarnings(config, model)[0].find("walked at -0.0862 m/s"), std::string::npos);
   config.set_longest(0.2);
-  config.mutable_motion()->set_swing(1);
+  config.set_gap(0.05);
   config.set_quasi_static(false);
   const std::vector<std::string> warnings = WalkWarnings(config, model);
   ASSERT_EQ(warnings.size(), 2);
-  EXPECT_NE(warnings[0].find("walk.motion has no effect"), std::string::npos) << warnings[0];
-  EXPECT_NE(warnings[1].find("walk.longest has no effect"), std::string::npos) << warnings[1];
+  EXPECT_NE(warnings[0].find("walk.longest has no effect"), std::string::npos) << warnings[0];
+  EXPECT_NE(warnings[1].find("walk.gap has no effect"), std::string::npos) << warnings[1];
   config.mutable_command(0)->set_vx(5);
   EXPECT_EQ(WalkWarnings(config, model).size(), 3);
 }
@@ -289,21 +271,17 @@ TEST(WalkLimits, AVelocityThatNoStepReachesAndWhatHasNoEffectAreTold) {
 TEST(WalkLimits, AsideAndInATurnOnlyEverySecondStepGoesOut) {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
   WalkConfig config = Enabled();
-  StepMotion* motion = config.mutable_motion();
-  motion->set_unload(0.2);
-  motion->set_swing(0.5);
-  motion->set_settle(0.1);
-  motion->set_load(0.2);  // 1 s a step, 0.12 m and 0.35 rad in two
+  // 0.12 m and 0.35 rad in two steps of 2.9 s.
   WalkCommandConfig* command = config.add_command();
-  command->set_vy(0.06);
-  command->set_wz(-0.175);
+  command->set_vy(0.0206);
+  command->set_wz(-0.0603);
   EXPECT_TRUE(WalkWarnings(config, model).empty());
-  command->set_vy(0.07);
-  command->set_wz(-0.18);
+  command->set_vy(0.021);
+  command->set_wz(-0.061);
   const std::vector<std::string> warnings = WalkWarnings(config, model);
   ASSERT_EQ(warnings.size(), 2);
-  EXPECT_NE(warnings[0].find("vy=0.07 is walked at 0.06 m/s"), std::string::npos) << warnings[0];
-  EXPECT_NE(warnings[1].find("wz=-0.18 is walked at -0.175 rad/s"), std::string::npos)
+  EXPECT_NE(warnings[0].find("vy=0.021 is walked at 0.0207 m/s"), std::string::npos) << warnings[0];
+  EXPECT_NE(warnings[1].find("wz=-0.061 is walked at -0.0603 rad/s"), std::string::npos)
       << warnings[1];
 }
 
