@@ -158,16 +158,6 @@ void ExpectDefaultsKeepTheirRules(const google::protobuf::Descriptor& type) {
     const FieldDescriptor* field = type.field(i);
     if (field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) {
       if (field->message_type()->file()->package() != "poise") continue;
-      if (const std::string text = GroupDefaultText(*field); !text.empty()) {
-        std::unique_ptr<Message> group(reflection->GetMessage(*message, field).New());
-        ASSERT_NO_THROW(ReadGroupDefault(type, field->name(), group.get())) << field->full_name();
-        // A group that has a default has one of each of its fields.
-        for (int k = 0; k < group->GetDescriptor()->field_count(); ++k) {
-          const FieldDescriptor* part = group->GetDescriptor()->field(k);
-          EXPECT_TRUE(group->GetReflection()->HasField(*group, part)) << part->full_name();
-        }
-        EXPECT_NO_THROW(CheckFields(*group)) << field->full_name();
-      }
       ExpectDefaultsKeepTheirRules(*field->message_type());
     } else if (field->has_default_value() && !field->is_repeated()) {
       if (field->cpp_type() == FieldDescriptor::CPPTYPE_DOUBLE) {

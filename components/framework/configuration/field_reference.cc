@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <sstream>
 #include <stdexcept>
 
 #include "components/framework/configuration/config_error.h"
@@ -106,18 +105,7 @@ std::string DefaultOf(const FieldDescriptor& field) {
   return {};
 }
 
-/// The value of a field in the text of a group's default, "unload: 0.2 load: 0.2"; empty: none.
-std::string ValueIn(const std::string& text, const std::string& name) {
-  std::istringstream words(text);
-  for (std::string word, value; words >> word;) {
-    if (word == name + ":" && words >> value) return value;
-  }
-  return {};
-}
-
-/// `defaults`: the text of the default of the group whose type this is.
-void Append(const Descriptor& type, const std::string& prefix, const std::string& defaults,
-            std::vector<FieldEntry>* entries) {
+void Append(const Descriptor& type, const std::string& prefix, std::vector<FieldEntry>* entries) {
   for (int i = 0; i < type.field_count(); ++i) {
     const FieldDescriptor& field = *type.field(i);
     if (field.full_name() == "poise.Scenario.applied") continue;
@@ -137,9 +125,6 @@ void Append(const Descriptor& type, const std::string& prefix, const std::string
     entry.unit = UnitOf(comment);
     entry.range = RangeOf(field);
     entry.meaning = comment;
-    if (const std::string value = ValueIn(defaults, field.name()); !value.empty()) {
-      entry.meaning += fmt::format("{} Default: {}.", comment.ends_with('.') ? "" : ".", value);
-    }
     if (field.cpp_type() == FieldDescriptor::CPPTYPE_ENUM) {
       const auto& values = *field.enum_type();
       if (entry.meaning.empty()) entry.meaning = Comment(values);
@@ -149,8 +134,7 @@ void Append(const Descriptor& type, const std::string& prefix, const std::string
     }
     const std::string path = entry.path;
     entries->push_back(std::move(entry));
-    if (entries->back().group)
-      Append(*field.message_type(), path + ".", GroupDefaultText(field), entries);
+    if (entries->back().group) Append(*field.message_type(), path + ".", entries);
   }
 }
 
@@ -205,7 +189,7 @@ void AddSchema(std::string_view descriptor_set) {
 
 std::vector<FieldEntry> FieldsOfType(const std::string& type, const std::string& prefix) {
   std::vector<FieldEntry> entries;
-  Append(TypeNamed(type), prefix, {}, &entries);
+  Append(TypeNamed(type), prefix, &entries);
   return entries;
 }
 
@@ -216,7 +200,7 @@ std::vector<FieldEntry> FieldsOfGroup(const std::string& type, const std::string
   group.meaning = Comment(TypeNamed(type));
   group.group = true;
   std::vector<FieldEntry> entries = {group};
-  Append(TypeNamed(type), path + ".", {}, &entries);
+  Append(TypeNamed(type), path + ".", &entries);
   return entries;
 }
 

@@ -1,11 +1,8 @@
 #include "components/framework/configuration/field_rules.h"
 
 #include <fmt/format.h>
-#include <google/protobuf/text_format.h>
 
 #include <cmath>
-#include <optional>
-#include <stdexcept>
 #include <vector>
 
 #include "components/framework/configuration/config_error.h"
@@ -128,17 +125,5 @@ void CheckNotNegative(double value, const std::string& field) {
 }
 
 std::string RangeOf(const FieldDescriptor& field) { return Range(RuleOf(field)); }
-
-std::string GroupDefaultText(const FieldDescriptor& group) {
-  return group.options().GetExtension(group_default);
-}
-
-void ReadGroupDefault(const google::protobuf::Descriptor& parent, const std::string& name,
-                      Message* group) {
-  const FieldDescriptor* const field = parent.FindFieldByName(name);
-  const bool good = field != nullptr && field->message_type() == group->GetDescriptor() &&
-                    google::protobuf::TextFormat::ParseFromString(GroupDefaultText(*field), group);
-  if (!good) throw std::logic_error(parent.full_name() + "." + name + " has no group_default");
-}
 
 }  // namespace poise

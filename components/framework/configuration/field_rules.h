@@ -20,22 +20,4 @@ void CheckNotNegative(double value, const std::string& field);
 /// What the field's rule allows: "greater than 0", "0 to 1"; empty: any number.
 std::string RangeOf(const google::protobuf::FieldDescriptor& field);
 
-/// The text of (group_default) of a group; empty: it has none.
-std::string GroupDefaultText(const google::protobuf::FieldDescriptor& group);
-
-/// The group's default: `Parent`'s field `name` as it is where nobody gives anything of it.
-template <class Group, class Parent>
-Group GroupDefault(const std::string& name);
-
-/// Parses GroupDefaultText into `group`. Throws std::logic_error: the text is none of its type.
-void ReadGroupDefault(const google::protobuf::Descriptor& parent, const std::string& name,
-                      google::protobuf::Message* group);
-
-template <class Group, class Parent>
-Group GroupDefault(const std::string& name) {
-  Group group;
-  ReadGroupDefault(*Parent::descriptor(), name, &group);
-  return group;
-}
-
 }  // namespace poise
