@@ -24,6 +24,7 @@
 #include "poise/ground_truth_t.hpp"
 #include "poise/health_t.hpp"
 #include "poise/joint_command_t.hpp"
+#include "poise/planner_status_t.hpp"
 #include "poise/robot_sensors_t.hpp"
 #include "poise/robot_state_t.hpp"
 #include "poise/support_plan_t.hpp"
@@ -49,6 +50,7 @@ struct RunRecord {
   Series<robot_state_t> state;
   Series<estimator_status_t> estimator;
   Series<support_plan_t> plan;
+  Series<planner_status_t> planner;
   Series<task_torque_t> task;
   Series<balance_torque_t> balance;
   Series<joint_command_t> command;
@@ -103,6 +105,7 @@ struct RunRecord {
     visit(&state);
     visit(&estimator);
     visit(&plan);
+    visit(&planner);
     visit(&task);
     visit(&balance);
     visit(&command);

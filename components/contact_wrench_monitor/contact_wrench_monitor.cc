@@ -214,7 +214,8 @@ int8_t ContactWrenchMonitor::ComputeBalance(const FootArray<bool>& in_contact, c
     for (Eigen::Vector2d& corner : region.mutable_corners()) corner -= cop_feedback_ * cop_error_;
   }
   if (region.num_corners == 0) return balance_torque_t::STATUS_SINGULAR;
-  const bool steps = balancing_ && support_plan_->stepping != support_plan_t::STEPPING_NONE;
+  // The COM follows a centre of pressure in the planner's steps alone.
+  const bool steps = balancing_ && support_plan_->com_follows == support_plan_t::FOLLOWS_COP;
   balance::BalanceResult result;
   balance::BalanceStatus status = balance::BalanceStatus::kOk;
   if (!steps || !MoveForStep(geometry, region, &result)) {

@@ -105,6 +105,11 @@ bool PhaseSchedule::Due(double time) const {
          time >= origin_ + phase().duration() - kTimeTolerance;
 }
 
+double PhaseSchedule::TimeLeft(double time) const {
+  if (next() == PhaseGraph::kNone) return -1;
+  return std::max(0.0, origin_ + phase().duration() - time);
+}
+
 bool PhaseSchedule::BeforeTouchDown() const {
   return phase().support() != DOUBLE && next() != PhaseGraph::kNone &&
          config_.phase(next()).support() == DOUBLE;

@@ -69,6 +69,8 @@ class PhaseSchedule {
   const Phase& phase() const { return config_.phase(state_.phase); }
   /// The phase that follows when this one is done; kNone: none.
   int next() const { return graph_.Follower(state_.phase, DONE); }
+  /// s until it is due, if nothing holds the phase back from now on; −1: nothing follows.
+  double TimeLeft(double time) const;
   const Phase& phase(int index) const { return config_.phase(index); }
   /// The phase under way stands on one foot, the next on both.
   bool BeforeTouchDown() const;

@@ -14,9 +14,9 @@
 #include "components/robot/sole.h"
 #include "components/step_planner/planner_config.h"
 #include "components/step_planner/recovery_config.h"
+#include "components/step_planner/status_report.h"
 #include "components/step_planner/step_planner_type.h"
-#include "components/step_planner/stepping_report.h"
-#include "components/step_planner/support_report.h"
+#include "components/step_planner/support_order.h"
 
 namespace poise {
 
@@ -92,7 +92,8 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
     inputs.push_back(&stride_);
   }
   wiring->AddOutput(&support_plan_, "support_plan", FootCounts(*model_));
-  std::vector<OutputPort*> outputs{&support_plan_};
+  wiring->AddOutput(&planner_status_, "planner_status", FootCounts(*model_));
+  std::vector<OutputPort*> outputs{&support_plan_, &planner_status_};
   if (makes_steps_ || walks_quasi_static_) {
     wiring->AddOutput(&footsteps_, "footsteps", {});
     footsteps_->stance = -1;
@@ -103,14 +104,16 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
     TakeActs(tick);
     support_plan_->status = Plan(tick.time);
   });
-  support_plan_t& out = *support_plan_;
-  const Eigen::Isometry3d identity = Eigen::Isometry3d::Identity();
-  out.transition_foot = out.step_foot = -1;
-  SetMotion(RotationMotion(), &out.body_reference);
+  support_plan_t& plan = *support_plan_;
+  planner_status_t& status = *planner_status_;
+  plan.transition_foot = status.step_foot = -1;
+  status.next_phase = schedule_->next();
+  status.phase_left = -1;
+  SetMotion(RotationMotion(), &plan.body_reference);
   for (const Foot f : kFeet) {
-    out.in_contact[Index(f)] = out.next_in_contact[Index(f)] = in_contact_[f] ? 1 : 0;
-    SetPose(identity, &out.foot_pose[Index(f)]);
-    SetMotion(RotationMotion(), &out.foot_rotation_reference[Index(f)]);
+    plan.in_contact[Index(f)] = status.next_in_contact[Index(f)] = in_contact_[f] ? 1 : 0;
+    SetPose(Eigen::Isometry3d::Identity(), &status.foot_pose[Index(f)]);
+    SetMotion(RotationMotion(), &plan.foot_rotation_reference[Index(f)]);
   }
 }
 
@@ -136,6 +139,7 @@ bool StepPlanner::Archive(StateArchive* archive) {
                 step_needed_, planned_, recovery_, walk_, footstep_report_);
   for (const Foot f : kFeet) archive->Show(landing_[f], contact_loss_[f]);
   ArchiveMessage(&*support_plan_, archive);
+  ArchiveMessage(&*planner_status_, archive);
   if (makes_steps_ || walks_quasi_static_) ArchiveMessage(&*footsteps_, archive);
   return true;
 }
@@ -294,7 +298,7 @@ stepping::StepInput StepPlanner::SeeSteps(double time, const robot::FootArray<do
   for (const Foot f : kFeet) input.load_deviation[f] = LoadDeviation(f);
   input.in_contact = in_contact_;
   input.com_height = references_.com.position.z();
-  input.step_needed = support_plan_->step_needed != 0;
+  input.step_needed = planner_status_->step_needed != 0;
   input.allowed = last_controlled_;
   if (walks_by_steps_) input.command = WalkCommandAt(time);
   for (const Foot f : kFeet) {
@@ -366,31 +370,32 @@ void StepPlanner::BeginPhase(double time) {
 }
 
 void StepPlanner::Report(double time, const Capture& capture) {
-  support_plan_t* const plan = &*support_plan_;
-  const robot::RobotData& data = whole_body_->data();
+  planner_status_t* const status = &*planner_status_;
   const EstimatedPose estimate = Estimate();
   const SupportView view{.schedule = *schedule_,
                          .held = Held(),
                          .steps = Steps(),
                          .in_contact = in_contact_,
                          .landing = landing_};
-  ReportPhase(view, time, plan);
-  ReportFeet(view, data, plan);
-  ReportReferences(view, data, estimate, references_, !schedule_->phase().gravity_compensation(),
-                   plan);
+  OrderSupport(view, estimate, references_, &*support_plan_);
+  status->feet_owner = static_cast<int8_t>(owner_);
+  ReportPhase(view, time, status);
+  ReportRobot(view, whole_body_->data(), status);
   const balance::ConvexPolygon soles =
       capture.known ? Soles(capture.frame_o, sole_) : balance::ConvexPolygon();
   if (soles.num_corners > 0) {
-    ReportCapture(time, capture.frame_o, soles, capture.pendulum, &step_needed_, plan);
+    ReportCapture(time, capture.frame_o, soles, capture.pendulum, &step_needed_, status);
   }
   if (!makes_steps_ && !walks_quasi_static_) return;
   const bool walking = walks_quasi_static_ && owner_ != FeetOwner::kRecovery;
   ReportStepping(walking ? walk_.status() : recovery_.status(),
                  walking && walk_.active() ? walk_.command() : recovery_.command(), time,
-                 estimate.sole, plan);
-  plan->num_steps = recovery_.num_steps() + walk_.num_begun();
-  const FootstepInput input{
-      .time = time, .com_height = data.com.z(), .sole = estimate.sole, .in_contact = in_contact_};
+                 estimate.sole, status);
+  status->num_steps = recovery_.num_steps() + walk_.num_begun();
+  const FootstepInput input{.time = time,
+                            .com_height = estimate.com.z(),
+                            .sole = estimate.sole,
+                            .in_contact = in_contact_};
   footstep_report_.Update(input, makes_steps_ ? &recovery_ : nullptr,
                           walks_quasi_static_ ? &walk_ : nullptr, &*footsteps_);
 }
@@ -547,7 +552,7 @@ ComponentType StepPlannerType() {
       [] { return std::make_unique<StepPlanner>(); },
       {},
       {Reads<robot_state_t>("robot_state"), Reads<operate::act_t>("operator", InputKind::kLatest),
-       Writes<support_plan_t>("support_plan")},
+       Writes<support_plan_t>("support_plan"), Writes<planner_status_t>("planner_status")},
       StepPlannerConfig::descriptor(),
       step_planner_proto_schema};
 }

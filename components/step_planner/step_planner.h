@@ -1,4 +1,4 @@
-// The step planner: phases, references and capture point, the support plan of a tick.
+// The step planner: phases, references and capture point, the order and the report of a tick.
 #pragma once
 
 #include <memory>
@@ -20,6 +20,7 @@
 #include "components/step_planner/stance_follower.h"
 #include "components/step_planner/stepping/recovery.h"
 #include "components/step_planner/walk_config.h"
+#include "poise/planner_status_t.hpp"
 #include "poise/robot_state_t.hpp"
 #include "poise/support_plan_t.hpp"
 #include "steps/message_traits.hpp"
@@ -36,10 +37,15 @@ namespace poise {
 /// | recovery       | walk     | at rest, and told to walk |
 /// | recovery, walk | phases   | at rest on the feet that the phase stands on |
 /// | recovery, walk | stance   | at rest on both feet, where the phase stands on one |
-enum class FeetOwner { kPhases, kRecovery, kWalk, kStance };
+enum class FeetOwner : int8_t {
+  kPhases = planner_status_t::OWNER_PHASES,
+  kRecovery = planner_status_t::OWNER_RECOVERY,
+  kWalk = planner_status_t::OWNER_WALK,
+  kStance = planner_status_t::OWNER_STANCE
+};
 
-/// ROBOT_STATE -> SUPPORT_PLAN, and FOOTSTEPS where it makes steps. When a state is invalid the
-/// plan of the last good tick is sent again with the status set.
+/// ROBOT_STATE -> SUPPORT_PLAN, PLANNER_STATUS, and FOOTSTEPS where it makes steps. When a state is
+/// invalid plan and report of the last good tick are sent again, the plan with the status set.
 class StepPlanner : public Component, public Operated {
  public:
   void Configure(const ComponentContext& context, Wiring* wiring) override;
@@ -99,12 +105,14 @@ class StepPlanner : public Component, public Operated {
   /// By foot: it alone can carry the robot, as the capture point, where the COM can be brought to
   /// rest, lies inside its reduced sole. At rest that is the COM's projection, and the CoP.
   robot::FootArray<bool> ComOverFoot() const;
+  /// Fills the tick's messages, but for the plan's status.
   void Report(double time, const Capture& capture);
 
   Input<robot_state_t> robot_state_;
   ActInput operator_;
   Input<::steps::stride_t> stride_;  // where stride_port_ is
   Output<support_plan_t> support_plan_;
+  Output<planner_status_t> planner_status_;
   Output<::steps::footsteps_t> footsteps_;  // where it makes steps
 
   std::shared_ptr<const robot::RobotModel> model_;

@@ -140,10 +140,11 @@ void TaskController::SetGains() {
 
 void TaskController::FollowGround() {
   if (!soft_ground_) return;
-  const support_plan_t& plan = *support_plan_;
+  // The COM follows a centre of pressure in the planner's steps alone.
+  const bool steps = support_plan_->com_follows == support_plan_t::FOLLOWS_COP;
   robot::FootArray<SoftGround::FootState> feet;
   for (const Foot f : kFeet) {
-    feet[f].put_down = in_contact_[f] && plan.stepping == support_plan_t::STEPPING_NONE;
+    feet[f].put_down = in_contact_[f] && !steps;
     feet[f].height = whole_body_->data().foot_pose[f].translation().z();
     feet[f].load = -robot_state_->foot_wrench[Index(f)].force[2];
   }

@@ -82,16 +82,16 @@ void AddBalancing(const RunRecord& run, EventList* events) {
 
 /// The robot walks, and the capture point is within the sole that carries, the planned foothold and
 /// what lies between: the step that is needed is the one under way.
-bool WalksThere(const RunRecord& run, const support_plan_t& plan) {
-  if (plan.stepping == support_plan_t::STEPPING_NONE || plan.step_foot < 0 || plan.step_foot > 1 ||
-      plan.step_reason != support_plan_t::REASON_WALK) {
+bool WalksThere(const RunRecord& run, const planner_status_t& planner) {
+  if (planner.stepping == planner_status_t::STEPPING_NONE || planner.step_foot < 0 ||
+      planner.step_foot > 1 || planner.step_reason != planner_status_t::REASON_WALK) {
     return false;
   }
-  const auto foot = static_cast<size_t>(plan.step_foot);
-  const Eigen::Isometry3d stance = GetPose(plan.foot_pose[1 - foot]);
+  const auto foot = static_cast<size_t>(planner.step_foot);
+  const Eigen::Isometry3d stance = GetPose(planner.foot_pose[1 - foot]);
   // The foothold's heading is not told: it is nearly the stance foot's.
   Eigen::Isometry3d foothold = stance;
-  foothold.translation() = GetVector3(plan.foothold);
+  foothold.translation() = GetVector3(planner.foothold);
   std::array<Eigen::Vector2d, balance::ConvexPolygon::kMaxCorners> points;
   size_t count = 0;
   for (const auto& [pose, sole] : {std::pair{stance, 1 - foot}, std::pair{foothold, foot}}) {
@@ -101,24 +101,24 @@ bool WalksThere(const RunRecord& run, const support_plan_t& plan) {
       points[count++] = (pose * Eigen::Vector3d(corner.x(), corner.y(), 0)).head<2>();
     }
   }
-  const Eigen::Vector2d point(plan.capture_point[0], plan.capture_point[1]);
+  const Eigen::Vector2d point(planner.capture_point[0], planner.capture_point[1]);
   return balance::SignedDistance(balance::ConvexHull({points.data(), count}), point) > -kStrays;
 }
 
 void AddCapturePoint(const RunRecord& run, EventList* events) {
   const auto needed = [&](int64_t tick) -> std::optional<bool> {
-    const support_plan_t* plan = run.plan.at(tick);
-    if (plan == nullptr) return {};
-    return plan->step_needed != 0 && !WalksThere(run, *plan);
+    const planner_status_t* planner = run.planner.at(tick);
+    if (planner == nullptr) return {};
+    return planner->step_needed != 0 && !WalksThere(run, *planner);
   };
   const std::vector<Interval> intervals = Intervals(run, needed);
   for (const Interval& interval : intervals) {
-    const support_plan_t& plan = *run.plan.at(interval.begin);
+    const planner_status_t& planner = *run.planner.at(interval.begin);
     events->Add(interval.begin, "step_needed",
                 fmt::format("a foot at ({:.2f}, {:.2f}) m within {:.2f} s; capture point {:.1f} mm "
                             "beyond the soles",
-                            plan.step_position[0], plan.step_position[1], plan.step_time,
-                            -kMilli * plan.capture_margin));
+                            planner.step_position[0], planner.step_position[1], planner.step_time,
+                            -kMilli * planner.capture_margin));
     events->AddEndOf(interval, "step_needed_ends", "capture point inside the soles again");
   }
 }
@@ -140,8 +140,8 @@ void AddSteps(const RunRecord& run, EventList* events) {
                             step.planned.y(), in_time, StepReason(step.reason)));
     if (!step.landing) continue;
     // A walk plans no capture point.
-    const bool catches = step.reason != support_plan_t::REASON_WALK &&
-                         step.reason != support_plan_t::REASON_TOGETHER;
+    const bool catches = step.reason != planner_status_t::REASON_WALK &&
+                         step.reason != planner_status_t::REASON_TOGETHER;
     events->Add(
         *step.landing, "step_lands",
         fmt::format("{} at ({:.2f}, {:.2f}) m, {:.0f} mm from its last foothold, {:.0f} mm "
@@ -152,15 +152,15 @@ void AddSteps(const RunRecord& run, EventList* events) {
                     kMilli * (step.planned - step.from).norm(), Inside(step.margin),
                     catches ? fmt::format(" (planned {})", Inside(step.planned_margin)) : ""));
   }
-  int8_t before = support_plan_t::STEPPING_NONE;
+  int8_t before = planner_status_t::STEPPING_NONE;
   for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const support_plan_t* plan = run.plan.at(tick);
-    if (plan == nullptr) continue;
-    if (before != support_plan_t::STEPPING_NONE &&
-        plan->stepping == support_plan_t::STEPPING_NONE) {
+    const planner_status_t* planner = run.planner.at(tick);
+    if (planner == nullptr) continue;
+    if (before != planner_status_t::STEPPING_NONE &&
+        planner->stepping == planner_status_t::STEPPING_NONE) {
       events->Add(tick, "step_rests", "the COM is at rest between the feet");
     }
-    before = plan->stepping;
+    before = planner->stepping;
   }
 }
 

@@ -25,27 +25,27 @@ constexpr double kTipsShare = 0.3, kTipsDistance = 1e-3, kTipsGap = 0.01, kLeast
 }  // namespace
 
 void AddFootEvents(const RunRecord& run, bool ended, EventList* events) {
-  const support_plan_t* before = nullptr;
+  const planner_status_t* before = nullptr;
   for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const support_plan_t* plan = run.plan.at(tick);
-    if (plan == nullptr) continue;
+    const planner_status_t* planner = run.planner.at(tick);
+    if (planner == nullptr) continue;
     for (size_t foot = 0; before != nullptr && foot < 2; ++foot) {
-      const int8_t is = plan->foot_state[foot];
+      const int8_t is = planner->foot_state[foot];
       if (is == before->foot_state[foot]) continue;
-      const double height =
-          kMilli * (plan->foot_pose[foot].position[2] - plan->foot_pose[1 - foot].position[2]);
-      if (is == support_plan_t::FOOT_SEARCHING) {
+      const double height = kMilli * (planner->foot_pose[foot].position[2] -
+                                      planner->foot_pose[1 - foot].position[2]);
+      if (is == planner_status_t::FOOT_SEARCHING) {
         events->Add(tick, "searching",
                     fmt::format("{} without contact {:.1f} mm above the other sole",
                                 FootName(run, foot), height));
-      } else if (is == support_plan_t::FOOT_RETRACTED) {
+      } else if (is == planner_status_t::FOOT_RETRACTED) {
         events->Add(tick, "no_surface",
                     fmt::format("{} found no surface down to {:.1f} mm above the other sole; "
                                 "retracted",
                                 FootName(run, foot), height));
       }
     }
-    before = plan;
+    before = planner;
   }
   for (const TouchDown& touch : TouchDowns(run)) {
     const std::string foot = FootName(run, touch.foot);

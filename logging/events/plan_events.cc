@@ -14,11 +14,11 @@ namespace {
 /// What the phase before came to, where that is not its planned end; else empty.
 std::string OutcomeText(int8_t outcome) {
   switch (outcome) {
-    case support_plan_t::OUTCOME_NO_SURFACE:
+    case planner_status_t::OUTCOME_NO_SURFACE:
       return ": no surface was found";
-    case support_plan_t::OUTCOME_CONTACT_LOST:
+    case planner_status_t::OUTCOME_CONTACT_LOST:
       return ": a contact was lost";
-    case support_plan_t::OUTCOME_TIMEOUT:
+    case planner_status_t::OUTCOME_TIMEOUT:
       return ": the phase before had waited for too long";
     default:
       return "";
@@ -30,19 +30,19 @@ void AddPhases(const RunRecord& run, EventList* events) {
   std::optional<int32_t> phase;
   double last_time = 0;
   for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const support_plan_t* plan = run.plan.at(tick);
-    if (plan == nullptr) continue;
+    const planner_status_t* planner = run.planner.at(tick);
+    if (planner == nullptr) continue;
     // A phase may follow itself: then its time begins anew.
-    const bool began = plan->phase != phase || plan->phase_time < last_time;
-    last_time = plan->phase_time;
+    const bool began = planner->phase != phase || planner->phase_time < last_time;
+    last_time = planner->phase_time;
     if (!began) continue;
-    phase = plan->phase;
+    phase = planner->phase;
     const auto i = static_cast<size_t>(*phase);
     const bool named = schedule && i < schedule->phases.size() && !schedule->phases[i].name.empty();
     events->Add(tick, "phase_began",
                 (named ? fmt::format("phase {}, {}", *phase, schedule->phases[i].name)
                        : fmt::format("phase {}", *phase)) +
-                    OutcomeText(plan->began_by));
+                    OutcomeText(planner->began_by));
   }
 }
 
@@ -73,13 +73,14 @@ void AddHandovers(const RunRecord& run, EventList* events) {
 
 void AddWaiting(const RunRecord& run, EventList* events) {
   for (const auto& [reason, text] :
-       {std::pair{support_plan_t::WAITING_COM, "for the COM to come above the stance sole"},
-        std::pair{support_plan_t::WAITING_CONTACT, "for the measured load to confirm the contact"},
-        std::pair{support_plan_t::WAITING_NO_SURFACE, "no surface was found"}}) {
+       {std::pair{planner_status_t::WAITING_COM, "for the COM to come above the stance sole"},
+        std::pair{planner_status_t::WAITING_CONTACT,
+                  "for the measured load to confirm the contact"},
+        std::pair{planner_status_t::WAITING_NO_SURFACE, "no surface was found"}}) {
     const auto holds = [&, wanted = reason](int64_t tick) -> std::optional<bool> {
-      const support_plan_t* plan = run.plan.at(tick);
-      if (plan == nullptr) return {};
-      return plan->waiting_for == wanted;
+      const planner_status_t* planner = run.planner.at(tick);
+      if (planner == nullptr) return {};
+      return planner->waiting_for == wanted;
     };
     events->AddIntervals(Intervals(run, holds), "waiting_begins", "waiting_ends",
                          [&, why = text](int64_t) { return std::string(why); });

@@ -111,13 +111,13 @@ std::optional<Eigen::Matrix<double, 6, 1>> KnownWrench(const RunRecord& run, siz
 
 namespace {
 
-/// The soles in the world: as estimated for the plan; in a run without plan the true ones.
+/// The soles in the world: as the planner estimates them; without its report the true ones.
 std::optional<std::array<Eigen::Isometry3d, 2>> Soles(const RunRecord& run, int64_t tick) {
   const auto poses = [](const auto* message) -> std::optional<std::array<Eigen::Isometry3d, 2>> {
     if (message == nullptr) return {};
     return std::array{GetPose(message->foot_pose[0]), GetPose(message->foot_pose[1])};
   };
-  return run.plan.empty() ? poses(run.truth.at(tick)) : poses(run.plan.at(tick));
+  return run.planner.empty() ? poses(run.truth.at(tick)) : poses(run.planner.at(tick));
 }
 
 using FootWrenches = std::array<std::optional<balance::Vector6d>, 2>;  // empty: out of contact

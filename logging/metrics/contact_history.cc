@@ -16,16 +16,18 @@ std::array<bool, 2> Contacts(const std::vector<int8_t>& in_contact) {
   return {in_contact[0] != 0, in_contact[1] != 0};
 }
 
-double Height(const support_plan_t& plan, size_t foot) { return plan.foot_pose[foot].position[2]; }
+double Height(const planner_status_t& planner, size_t foot) {
+  return planner.foot_pose[foot].position[2];
+}
 
 /// Follows where each foot's reference is to end before both feet are to stand, phase by phase.
 class ReferenceEnds {
  public:
   explicit ReferenceEnds(const RunRecord& run) : schedule_(ReadSchedulePlan(run)) {}
 
-  void Update(const support_plan_t& plan) {
-    if (plan.phase == phase_) return;
-    phase_ = plan.phase;
+  void Update(const planner_status_t& planner, const support_plan_t& plan) {
+    if (planner.phase == phase_) return;
+    phase_ = planner.phase;
     if (!schedule_ || phase_ < 0 || static_cast<size_t>(phase_) >= schedule_->phases.size()) return;
     std::array<double, 2> level{plan.foot_reference[0].position[2],
                                 plan.foot_reference[1].position[2]};
@@ -40,16 +42,16 @@ class ReferenceEnds {
       if (!phase.foot) continue;
       const auto f = static_cast<size_t>(phase.foot->foot);
       if (phase.foot->above_support) {
-        level[f] = Height(plan, 1 - f) + phase.foot->z;
+        level[f] = Height(planner, 1 - f) + phase.foot->z;
       } else if (!(now && phase.foot->at_once)) {  // else it stands there already
         level[f] += phase.foot->z;
       }
       end_[f] = level[f];
     }
   }
-  void Place(const support_plan_t& plan, TouchDown* touch) const {
+  void Place(const planner_status_t& planner, TouchDown* touch) const {
     if (!end_[touch->foot]) return;
-    touch->above_end = Height(plan, touch->foot) - *end_[touch->foot];
+    touch->above_end = Height(planner, touch->foot) - *end_[touch->foot];
     touch->timing = *touch->above_end > kExpectedWithin    ? Timing::kEarly
                     : *touch->above_end < -kExpectedWithin ? Timing::kLate
                                                            : Timing::kExpected;
@@ -98,27 +100,28 @@ std::vector<SupportChange> SupportChanges(const RunRecord& run) {
 std::vector<TouchDown> TouchDowns(const RunRecord& run) {
   std::vector<TouchDown> touches;
   ReferenceEnds ends(run);
-  const support_plan_t* before = nullptr;
+  const planner_status_t* before = nullptr;
   std::array<bool, 2> down{};  // a sole that bounces touches down once
   for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const support_plan_t* plan = run.plan.at(tick);
-    if (plan == nullptr) continue;
-    ends.Update(*plan);
+    const planner_status_t* planner = run.planner.at(tick);
+    if (planner == nullptr) continue;
+    if (const support_plan_t* plan = run.plan.at(tick)) ends.Update(*planner, *plan);
     for (size_t foot = 0; before != nullptr && foot < 2; ++foot) {
-      const int8_t was = before->foot_state[foot], is = plan->foot_state[foot];
-      const bool off = was != support_plan_t::FOOT_SUPPORT && was != support_plan_t::FOOT_TOUCHING;
+      const int8_t was = before->foot_state[foot], is = planner->foot_state[foot];
+      const bool off =
+          was != planner_status_t::FOOT_SUPPORT && was != planner_status_t::FOOT_TOUCHING;
       // The schedule alone decided on a foot that goes from a swing straight to support.
       const bool confirmed =
-          is == support_plan_t::FOOT_TOUCHING ||
-          (is == support_plan_t::FOOT_SUPPORT && was == support_plan_t::FOOT_SEARCHING);
-      if (was == support_plan_t::FOOT_SUPPORT) down[foot] = false;
+          is == planner_status_t::FOOT_TOUCHING ||
+          (is == planner_status_t::FOOT_SUPPORT && was == planner_status_t::FOOT_SEARCHING);
+      if (was == planner_status_t::FOOT_SUPPORT) down[foot] = false;
       if (!off || !confirmed || down[foot]) continue;
       down[foot] = true;
-      TouchDown touch{tick, foot, Height(*plan, foot) - Height(*plan, 1 - foot), {}};
-      ends.Place(*plan, &touch);
+      TouchDown touch{tick, foot, Height(*planner, foot) - Height(*planner, 1 - foot), {}};
+      ends.Place(*planner, &touch);
       touches.push_back(touch);
     }
-    before = plan;
+    before = planner;
   }
   return touches;
 }

@@ -77,16 +77,16 @@ void AddCop(MetricList* list) {
 
 std::vector<Interval> StepNeeded(const RunRecord& run) {
   return Intervals(run, [&](int64_t tick) -> std::optional<bool> {
-    const support_plan_t* plan = run.plan.at(tick);
-    if (plan == nullptr) return {};
-    return plan->step_needed != 0;
+    const planner_status_t* planner = run.planner.at(tick);
+    if (planner == nullptr) return {};
+    return planner->step_needed != 0;
   });
 }
 
 /// s from the last begin of "step needed" to the fall, 0 when a fall was not announced.
 Answer WarningTime(const RunRecord& run) {
   const std::optional<int64_t> fall = DownTick(run);
-  if (!fall || run.plan.empty()) return {};
+  if (!fall || run.planner.empty()) return {};
   double warning = 0;
   for (const Interval& interval : StepNeeded(run)) {
     const bool lasts = interval.begin < *fall && interval.end.value_or(*fall) >= *fall;
@@ -101,9 +101,9 @@ void AddCapturePoint(MetricList* list) {
                    [](const RunRecord& run) {
                      return Scaled(Minimum(run,
                                            [&](int64_t t) -> Answer {
-                                             const support_plan_t* plan = run.plan.at(t);
-                                             if (plan == nullptr) return {};
-                                             return plan->capture_margin;
+                                             const planner_status_t* planner = run.planner.at(t);
+                                             if (planner == nullptr) return {};
+                                             return planner->capture_margin;
                                            }),
                                    kMilli);
                    }});
@@ -115,7 +115,7 @@ void AddCapturePoint(MetricList* list) {
                    }});
   list->push_back({"step_needed_time", "s", "time in which a step was said to be needed, in sum",
                    [](const RunRecord& run) -> Answer {
-                     if (run.plan.empty()) return {};
+                     if (run.planner.empty()) return {};
                      int64_t ticks = 0;
                      for (const Interval& interval : StepNeeded(run)) {
                        ticks += interval.end.value_or(run.num_ticks) - interval.begin;

@@ -92,8 +92,12 @@ void AddMotion(MetricList* list) {
            return Scaled(Maximum(run,
                                  [&](int64_t t) -> Answer {
                                    const support_plan_t* plan = run.plan.at(t);
-                                   if (plan == nullptr || !HasComReference(*plan, axis)) return {};
-                                   return std::abs(plan->com_position[axis] -
+                                   const planner_status_t* planner = run.planner.at(t);
+                                   if (plan == nullptr || planner == nullptr ||
+                                       !HasComReference(*plan, axis)) {
+                                     return {};
+                                   }
+                                   return std::abs(planner->com_position[axis] -
                                                    plan->com_reference.position[axis]);
                                  }),
                          kMilli);
@@ -166,15 +170,19 @@ void AddMotion(MetricList* list) {
                        "{}",
                        kFoot[foot], kAxis[axis]),
            [foot, axis](const RunRecord& run) {
-             return Scaled(Maximum(run,
-                                   [&](int64_t t) -> Answer {
-                                     const auto f = static_cast<size_t>(foot);
-                                     const support_plan_t* plan = run.plan.at(t);
-                                     if (plan == nullptr || plan->in_contact[f] != 0) return {};
-                                     return std::abs(plan->foot_pose[f].position[axis] -
-                                                     plan->foot_reference[f].position[axis]);
-                                   }),
-                           kMilli);
+             return Scaled(
+                 Maximum(run,
+                         [&](int64_t t) -> Answer {
+                           const auto f = static_cast<size_t>(foot);
+                           const support_plan_t* plan = run.plan.at(t);
+                           const planner_status_t* planner = run.planner.at(t);
+                           if (plan == nullptr || planner == nullptr || plan->in_contact[f] != 0) {
+                             return {};
+                           }
+                           return std::abs(planner->foot_pose[f].position[axis] -
+                                           plan->foot_reference[f].position[axis]);
+                         }),
+                 kMilli);
            }});
     }
   }

@@ -137,10 +137,10 @@ void AddCalibration(MetricList* list) {
     return 100 * (run.robot.total_mass() + state->load_mass - carried) / carried;
   };
   const auto com = [](const RunRecord& run, int64_t tick, int axis) -> Answer {
-    const support_plan_t* plan = run.plan.at(tick);
+    const planner_status_t* planner = run.planner.at(tick);
     const ground_truth_t* truth = run.truth.at(tick);
-    if (plan == nullptr || truth == nullptr) return {};
-    return kMilli * (plan->com_position[axis] - truth->com_position[axis]);
+    if (planner == nullptr || truth == nullptr) return {};
+    return kMilli * (planner->com_position[axis] - truth->com_position[axis]);
   };
   const auto tilt = [](const RunRecord& run, int64_t tick, int axis) -> Answer {
     const estimator_status_t* status = run.estimator.at(tick);
@@ -223,7 +223,7 @@ void AddObserver(MetricList* list) {
                    "touch-downs as planned for, of feet whose true load had not been above 4 N in "
                    "the 20 ms before",
                    [](const RunRecord& run) -> Answer {
-                     if (run.plan.empty() || run.truth.empty()) return {};
+                     if (run.planner.empty() || run.truth.empty()) return {};
                      int found = 0;
                      for (const TouchDown& touch : TouchDowns(run)) {
                        found += TouchedNothing(run, touch.foot, touch.tick) ? 1 : 0;

@@ -59,9 +59,9 @@ void AddOutcome(MetricList* list) {
                    }});
   list->push_back({"last_phase", "", "index of the scenario's phase at the end, from 0",
                    [](const RunRecord& run) -> Answer {
-                     const support_plan_t* plan = run.plan.at(run.num_ticks - 1);
-                     if (plan == nullptr) return {};
-                     return plan->phase;
+                     const planner_status_t* planner = run.planner.at(run.num_ticks - 1);
+                     if (planner == nullptr) return {};
+                     return planner->phase;
                    }});
   list->push_back({"real_time_factor", "", "simulated time over wall time (informs only)",
                    [](const RunRecord& run) { return run.real_time_factor; }});

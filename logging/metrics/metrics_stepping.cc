@@ -13,10 +13,10 @@ namespace {
 /// Ticks in which a foot is on its way, a step each.
 std::vector<Interval> Steps(const RunRecord& run) {
   return Intervals(run, [&](int64_t tick) -> std::optional<bool> {
-    const support_plan_t* plan = run.plan.at(tick);
-    if (plan == nullptr) return {};
-    return plan->stepping == support_plan_t::STEPPING_UNLOADING ||
-           plan->stepping == support_plan_t::STEPPING_SWINGING;
+    const planner_status_t* planner = run.planner.at(tick);
+    if (planner == nullptr) return {};
+    return planner->stepping == planner_status_t::STEPPING_UNLOADING ||
+           planner->stepping == planner_status_t::STEPPING_SWINGING;
   });
 }
 
@@ -100,9 +100,10 @@ void AddStepping(MetricList* list) {
                    [](const RunRecord& run) -> Answer {
                      Answer least;
                      for (const Interval& step : Steps(run)) {
-                       const support_plan_t* plan = step.end ? run.plan.at(*step.end) : nullptr;
-                       if (plan == nullptr) continue;
-                       const double margin = kMilli * plan->foothold_margin;
+                       const planner_status_t* planner =
+                           step.end ? run.planner.at(*step.end) : nullptr;
+                       if (planner == nullptr) continue;
+                       const double margin = kMilli * planner->foothold_margin;
                        least = least ? std::min(*least, margin) : margin;
                      }
                      return least;

@@ -172,7 +172,9 @@ void AddTouchDowns(MetricList* list) {
                    }});
   const auto count = [&](const char* name, const char* text, Timing timing) {
     list->push_back({name, "", text, [timing](const RunRecord& run) -> Answer {
-                       if (run.plan.empty() || !ReadSchedulePlan(run)) return {};
+                       if (run.planner.empty() || run.plan.empty() || !ReadSchedulePlan(run)) {
+                         return {};
+                       }
                        int found = 0;
                        for (const TouchDown& touch : TouchDowns(run)) {
                          if (touch.tick < run.first_tick) continue;
@@ -188,14 +190,14 @@ void AddTouchDowns(MetricList* list) {
         Timing::kLate);
   list->push_back({"no_surface_stops", "", "times that a foot found no surface and was retracted",
                    [](const RunRecord& run) -> Answer {
-                     if (run.plan.empty()) return {};
+                     if (run.planner.empty()) return {};
                      int stops = 0;
                      for (int foot = 0; foot < 2; ++foot) {
                        const auto retracted =
                            [&, f = static_cast<size_t>(foot)](int64_t t) -> std::optional<bool> {
-                         const support_plan_t* plan = run.plan.at(t);
-                         if (plan == nullptr) return {};
-                         return plan->foot_state[f] == support_plan_t::FOOT_RETRACTED;
+                         const planner_status_t* planner = run.planner.at(t);
+                         if (planner == nullptr) return {};
+                         return planner->foot_state[f] == planner_status_t::FOOT_RETRACTED;
                        };
                        for (const Interval& stop : Intervals(run, retracted)) {
                          stops += stop.begin >= run.first_tick ? 1 : 0;

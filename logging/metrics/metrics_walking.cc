@@ -31,10 +31,10 @@ struct Stride {
 bool PlannerWalks(const RunRecord& run, int64_t begin, int64_t end) {
   bool walks = false;
   for (int64_t t = begin; t < end; ++t) {
-    const support_plan_t* plan = run.plan.at(t);
-    if (plan == nullptr) continue;
-    walks = plan->stepping != support_plan_t::STEPPING_NONE &&
-            plan->step_reason == support_plan_t::REASON_WALK;
+    const planner_status_t* planner = run.planner.at(t);
+    if (planner == nullptr) continue;
+    walks = planner->stepping != planner_status_t::STEPPING_NONE &&
+            planner->step_reason == planner_status_t::REASON_WALK;
     if (!walks) return false;
   }
   return walks;
@@ -60,11 +60,11 @@ std::vector<Stride> Strides(const RunRecord& run) {
     stride.way = (GetVector3(to->com_position) - GetVector3(from->com_position)).head<2>();
     stride.duration = run.duration(end - begin);
     for (int64_t t = begin; t < end; ++t) {
-      const support_plan_t* plan = run.plan.at(t);
+      const planner_status_t* planner = run.planner.at(t);
       const ground_truth_t* truth = run.truth.at(t);
-      if (plan == nullptr || truth == nullptr) continue;
-      stride.planned = stride.planned || plan->step_reason == support_plan_t::REASON_WALK;
-      const Vector2d velocity(plan->walk_velocity[0], plan->walk_velocity[1]);
+      if (planner == nullptr || truth == nullptr) continue;
+      stride.planned = stride.planned || planner->step_reason == planner_status_t::REASON_WALK;
+      const Vector2d velocity(planner->walk_velocity[0], planner->walk_velocity[1]);
       stride.commanded += run.duration(1) * (Eigen::Rotation2Dd(Heading(*truth)) * velocity);
     }
     strides.push_back(stride);

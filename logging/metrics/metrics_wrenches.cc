@@ -29,10 +29,10 @@ struct ForceErrors {
 
 std::optional<ForceErrors> BothForceErrors(const RunRecord& run, int64_t tick) {
   const auto right = WrenchError(run, 0, tick), left = WrenchError(run, 1, tick);
-  if (!right || !left) return {};
-  const support_plan_t& plan = *run.plan.at(tick - 1);
-  return ForceErrors{GetPose(plan.foot_pose[0]).linear() * right->head<3>(),
-                     GetPose(plan.foot_pose[1]).linear() * left->head<3>(),
+  const planner_status_t* const planner = run.planner.at(tick - 1);
+  if (!right || !left || planner == nullptr) return {};
+  return ForceErrors{GetPose(planner->foot_pose[0]).linear() * right->head<3>(),
+                     GetPose(planner->foot_pose[1]).linear() * left->head<3>(),
                      run.command.at(tick - 1)->eta};
 }
 

@@ -12,7 +12,7 @@ namespace poise::logging {
 
 struct PlannerStep {
   size_t foot = 0;
-  int8_t reason = 0;                                   ///< support_plan_t::REASON_*
+  int8_t reason = 0;                                   ///< planner_status_t::REASON_*
   int64_t begin = 0;                                   ///< tick of the decision
   double planned_time = 0;                             ///< s to touch-down, then; 0: not timed yet
   Eigen::Vector2d from = Eigen::Vector2d::Zero();      ///< m, world, the sole's centre then

@@ -172,7 +172,7 @@ TEST_P(MonitorCase, PutsTheCentreOfPressureOnItsBoundAndLeavesTheHeightAlone) {
 // While steps are made each sole keeps its own conditions: the wrenches that the dynamics give for
 // the torque press, keep friction and its moment, and their centre of pressure is in the region.
 TEST_P(MonitorCase, InAStepEachSoleKeepsWhatTheGroundGives) {
-  plan_.stepping = support_plan_t::STEPPING_SWINGING;
+  plan_.com_follows = support_plan_t::FOLLOWS_COP;
   Harness<ContactWrenchMonitor> harness(&context_, "region: POLYGON sole_margin: 0.02");
   int active = 0, kept = 0;
   for (int trial = 0; trial < 60; ++trial) {

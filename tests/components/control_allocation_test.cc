@@ -123,16 +123,16 @@ TEST(ControlAllocation, NoneOfAPlannerThatWalks) {
     harness.Bind("robot_state", &state);
     std::set<int> stages;
     for (int tick = 0; tick < 2000; ++tick) {
-      const double time_left = harness.output<support_plan_t>().touch_down_time;
+      const double time_left = harness.output<planner_status_t>().touch_down_time;
       for (auto& wrench : state.foot_wrench) wrench.force[2] = time_left > 0 ? 0 : -100;
       const long before = allocations;
       harness.Run(TickAt(tick));
       ASSERT_EQ(allocations - before, 0) << "tick " << tick;
-      stages.insert(harness.output<support_plan_t>().stepping);
+      stages.insert(harness.output<planner_status_t>().stepping);
     }
-    EXPECT_GE(harness.output<support_plan_t>().num_steps, 2);
-    EXPECT_EQ(stages.count(support_plan_t::STEPPING_SWINGING), 1u);
-    EXPECT_EQ(stages.count(support_plan_t::STEPPING_LOADING), 1u);
+    EXPECT_GE(harness.output<planner_status_t>().num_steps, 2);
+    EXPECT_EQ(stages.count(planner_status_t::STEPPING_SWINGING), 1u);
+    EXPECT_EQ(stages.count(planner_status_t::STEPPING_LOADING), 1u);
   }
 }
 

@@ -396,8 +396,9 @@ TEST(Redistributor, ALandedFootKeepsItsShareUntilItLeavesTheGround) {
   chain.Run(StandingState(chain.model()), 0);
   support_plan_t plan = chain.plan();
   balance_torque_t balance = chain.balance();
+  const robot::RobotData standing = robot::Evaluate(chain.model(), StandingState(chain.model()));
   const auto sole_y = [&](size_t i) {
-    return (GetPose(balance.frame_o).inverse() * GetPose(plan.foot_pose[i])).translation().y();
+    return (GetPose(balance.frame_o).inverse() * standing.foot_pose[i]).translation().y();
   };
   ControlContext context(TestRobot::kDyros);
   Harness<Redistributor> alone(&context, RedistributorText("landed_share: 0.1"));
@@ -450,8 +451,9 @@ TEST(Redistributor, OnARampAFootMayCarryNothing) {
   alone.Bind("robot_state", &chain.state());
   alone.Bind("support_plan", &plan);
   alone.Bind("balance_torque", &balance);
+  const robot::RobotData standing = robot::Evaluate(chain.model(), StandingState(chain.model()));
   const double right =
-      (GetPose(balance.frame_o).inverse() * GetPose(plan.foot_pose[0])).translation().y();
+      (GetPose(balance.frame_o).inverse() * standing.foot_pose[0]).translation().y();
   const auto with_cop_at = [&](double y) -> const joint_command_t& {
     balance.resultant.moment[0] = balance.resultant.force[2] * y;
     alone.Run(TickAt(0));

@@ -86,6 +86,7 @@ class Chain {
     redistributor_.Restore(from->redistributor_.Save());
   }
   const support_plan_t& plan() const { return planner_.output<support_plan_t>(); }
+  const planner_status_t& planner() const { return planner_.output<planner_status_t>(); }
   const task_torque_t& task() const { return task_.output<task_torque_t>(); }
   const balance_torque_t& balance() const { return monitor_.output<balance_torque_t>(); }
   const joint_command_t& command() const { return redistributor_.output<joint_command_t>(); }
@@ -107,6 +108,7 @@ std::vector<uint8_t> Encoded(const T& message) {
 
 void ExpectSame(const Chain& a, const Chain& b, int64_t tick) {
   ASSERT_EQ(Encoded(a.plan()), Encoded(b.plan())) << "tick " << tick;
+  ASSERT_EQ(Encoded(a.planner()), Encoded(b.planner())) << "tick " << tick;
   ASSERT_EQ(Encoded(a.task()), Encoded(b.task())) << "tick " << tick;
   ASSERT_EQ(Encoded(a.balance()), Encoded(b.balance())) << "tick " << tick;
   ASSERT_EQ(Encoded(a.command()), Encoded(b.command())) << "tick " << tick;
@@ -131,8 +133,8 @@ TEST_P(Takeover, AFreshObjectForEveryTickGivesTheSameBits) {
     whole.Run(states[static_cast<size_t>(tick)], tick);
     reborn->Run(states[static_cast<size_t>(tick)], tick);
     ASSERT_NO_FATAL_FAILURE(ExpectSame(whole, *reborn, tick));
-    phases.insert(whole.plan().phase);
-    foot_states.insert(whole.plan().foot_state[1]);
+    phases.insert(whole.planner().phase);
+    foot_states.insert(whole.planner().foot_state[1]);
     transitions.insert(whole.plan().transition);
     balancing += whole.balance().active_x + whole.balance().active_y;
     // The body sways by less; its reference is turned by more.
@@ -142,8 +144,8 @@ TEST_P(Takeover, AFreshObjectForEveryTickGivesTheSameBits) {
   }
   EXPECT_EQ(phases.size(), 6u);
   EXPECT_EQ(foot_states,
-            (std::set<int>{support_plan_t::FOOT_SUPPORT, support_plan_t::FOOT_SWING,
-                           support_plan_t::FOOT_SEARCHING, support_plan_t::FOOT_TOUCHING}));
+            (std::set<int>{planner_status_t::FOOT_SUPPORT, planner_status_t::FOOT_SWING,
+                           planner_status_t::FOOT_SEARCHING, planner_status_t::FOOT_TOUCHING}));
   EXPECT_EQ(transitions.size(), GetParam() == robot::TestRobot::kDyros ? 3u : 2u);
   EXPECT_GT(balancing, 50);
   EXPECT_EQ(held, 4);
@@ -176,15 +178,15 @@ TEST_P(Takeover, SkippedTicksChangeNoScheduleAndNoReference) {
   std::vector<int> phase_of;
   for (int tick = 0; tick < kNumTicks; ++tick) {
     whole.Run(states[static_cast<size_t>(tick)], tick);
-    phase_of.push_back(whole.plan().phase);
+    phase_of.push_back(whole.planner().phase);
     if (tick % 3 != 0 || (tick > 180 && tick < 200)) continue;
     skipping.Run(states[static_cast<size_t>(tick)], tick);
     ASSERT_NE(skipping.command().status, joint_command_t::STATUS_INVALID_INPUT) << tick;
     // Measured contact, and with it double support, comes up to three ticks later.
     const int latest = phase_of.back(),
               earliest = phase_of[static_cast<size_t>(std::max(0, tick - 4))];
-    ASSERT_LE(skipping.plan().phase, latest) << tick;
-    ASSERT_GE(skipping.plan().phase, earliest) << tick;
+    ASSERT_LE(skipping.planner().phase, latest) << tick;
+    ASSERT_GE(skipping.planner().phase, earliest) << tick;
     for (int i = 0; i < 3; ++i) {
       // The reference moves by 0.4 m/s at the most, and is up to three ticks late.
       ASSERT_NEAR(skipping.plan().com_reference.position[i], whole.plan().com_reference.position[i],
@@ -192,7 +194,7 @@ TEST_P(Takeover, SkippedTicksChangeNoScheduleAndNoReference) {
           << tick;
     }
   }
-  EXPECT_EQ(skipping.plan().phase, 5);
+  EXPECT_EQ(skipping.planner().phase, 5);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Takeover,

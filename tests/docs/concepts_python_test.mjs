@@ -48,7 +48,7 @@ for (const page of repositoryFiles('docs/concepts').filter((f) => f.endsWith('.m
 }
 
 for (const [what, program] of [
-  ['a run', `run = poise.run("walk", {"hw_bridge.velocity_trip": 1e-6}, duration=1)\nprint(run["SUPPORT_PLAN"].num_steps[-1])`],
+  ['a run', `run = poise.run("walk", {"hw_bridge.velocity_trip": 1e-6}, duration=1)\nprint(run["PLANNER_STATUS"].num_steps[-1])`],
   ['an environment', 'env = poise.Environment("stand", {"hw_bridge.velocity_trip": 1e-6})\nenv.step(500)'],
 ]) {
   test(`${what} whose robot the bridge has stopped is told of`, () => {

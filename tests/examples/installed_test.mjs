@@ -175,7 +175,7 @@ test('a planner of footsteps of her own steps at its rhythm', () => {
     const out = join(folder, `rhythm_${period}`);
     poise(['run', 'step_in_rhythm', '--inline', '--out', out, '--set', `rhythm.period=${period}`, '--set', 'check='], {env});
     // From touch-down to touch-down, in the middle of its eight seconds.
-    const csv = poise(['echo', 'SUPPORT_PLAN', 'stepping', '--csv', '--log', out], {env}).trim().split('\n').slice(1);
+    const csv = poise(['echo', 'PLANNER_STATUS', 'stepping', '--csv', '--log', out], {env}).trim().split('\n').slice(1);
     const landed = csv.map((line) => line.split(',').at(-1)).flatMap((now, i, all) => now === '3' && all[i - 1] !== '3' ? [0.002 * i] : []);
     const middle = landed.filter((time) => time > 3.5 && time < 8.5);
     const mean = (middle.at(-1) - middle[0]) / (middle.length - 1);

@@ -169,10 +169,10 @@ test('forces: those of the log, where they act, upward', () => {
 });
 
 test('support: capture point, centre of mass, soles; ground: floor and block', () => {
-  const plan = byTime('SUPPORT_PLAN'), truth = byTime('GROUND_TRUTH');
+  const planner = byTime('PLANNER_STATUS'), truth = byTime('GROUND_TRUTH');
   for (const {message, value} of topics['/support']) {
     const entity = (id) => value.entities.find((e) => e.id === id);
-    assert.deepEqual(xyz(entity('capture point').spheres[0].pose.position), plan.get(message.logTime).capture_point);
+    assert.deepEqual(xyz(entity('capture point').spheres[0].pose.position), planner.get(message.logTime).capture_point);
     assert.deepEqual(xyz(entity('centre of mass').spheres[0].pose.position), truth.get(message.logTime).com_position);
     assert.equal(entity('soles').lines.length, 2);
     assert.ok(entity('support polygon').lines[0].points.length >= 4);

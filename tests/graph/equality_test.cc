@@ -11,7 +11,7 @@ namespace poise {
 namespace {
 
 constexpr int64_t kTicks = 200;    // of the scenario: 0.4 s at 500 Hz
-constexpr int64_t kChannels = 12;  // of the graph, external ones aside
+constexpr int64_t kChannels = 13;  // of the graph, external ones aside
 
 std::string LogOf(const std::string& out, const std::vector<std::string>& flags) {
   std::vector<std::string> arguments = {"run", StandScenario(), "--out", out};

@@ -19,22 +19,22 @@ TEST(Plan, AFootThatFindsNoSurfaceIsPutDownElsewhere) {
   std::vector<std::pair<int, int>> began;  // phase, outcome of the one before
   double lowest = 1, raised = -1, put_down = 1;
   for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const support_plan_t& plan = *run.plan.at(tick);
-    if (began.empty() || began.back().first != plan.phase) {
-      began.emplace_back(plan.phase, plan.began_by);
-      if (plan.phase == 4) raised = run.truth.at(tick)->foot_pose[1].position[2];
-      if (plan.phase == 5) put_down = run.truth.at(tick)->foot_pose[1].position[2];
+    const planner_status_t& planner = *run.planner.at(tick);
+    if (began.empty() || began.back().first != planner.phase) {
+      began.emplace_back(planner.phase, planner.began_by);
+      if (planner.phase == 4) raised = run.truth.at(tick)->foot_pose[1].position[2];
+      if (planner.phase == 5) put_down = run.truth.at(tick)->foot_pose[1].position[2];
     }
-    if (plan.phase == 2) {
+    if (planner.phase == 2) {
       lowest = std::min(lowest, run.truth.at(tick)->foot_pose[1].position[2]);
     }
   }
-  using Plan = support_plan_t;
-  EXPECT_EQ(began, (std::vector<std::pair<int, int>>{{0, Plan::OUTCOME_NONE},
-                                                     {1, Plan::OUTCOME_DONE},
-                                                     {2, Plan::OUTCOME_DONE},
-                                                     {4, Plan::OUTCOME_NO_SURFACE},
-                                                     {5, Plan::OUTCOME_DONE}}));
+  using Status = planner_status_t;
+  EXPECT_EQ(began, (std::vector<std::pair<int, int>>{{0, Status::OUTCOME_NONE},
+                                                     {1, Status::OUTCOME_DONE},
+                                                     {2, Status::OUTCOME_DONE},
+                                                     {4, Status::OUTCOME_NO_SURFACE},
+                                                     {5, Status::OUTCOME_DONE}}));
   // From 85 mm, 70 mm down, 50 mm up again, and onto the floor; the leg's friction takes some mm.
   EXPECT_NEAR(lowest, 0.015, 0.01);
   EXPECT_NEAR(raised, lowest + 0.05, 0.015);

@@ -185,24 +185,26 @@ TEST(Step, TheFeetComeSideBySideWhenAskedTo) {
     while (spec.graph().component(act.component).name() != "step_planner") ++act.component;
     std::vector<uint8_t> bytes(static_cast<size_t>(act.getEncodedSize()));
     ASSERT_GT(act.encode(bytes.data(), 0, act.getEncodedSize()), 0);
-    support_plan_t plan{};
+    planner_status_t planner{};
     ground_truth_t truth{};
     double least = 1;
     InlineRunner runner(spec, Components());
     runner.set_tap([&](int channel, const OutputPort& output, const Tick&) {
       const std::string& name = spec.graph().channel(channel).name();
-      if (name == "SUPPORT_PLAN") plan = *static_cast<const support_plan_t*>(output.message());
+      if (name == "PLANNER_STATUS") {
+        planner = *static_cast<const planner_status_t*>(output.message());
+      }
       if (name != "GROUND_TRUTH") return;
       truth = *static_cast<const ground_truth_t*>(output.message());
       least = std::min(least, BetweenSoles(truth, 0.30, 0.15));
     });
     runner.Run(act.tick);
-    EXPECT_NE(plan.step_reason, support_plan_t::REASON_NONE) << world;
-    EXPECT_EQ(plan.stepping, support_plan_t::STEPPING_NONE) << world;
+    EXPECT_NE(planner.step_reason, planner_status_t::REASON_NONE) << world;
+    EXPECT_EQ(planner.stepping, planner_status_t::STEPPING_NONE) << world;
     EXPECT_TRUE(runner.Inject("OPERATOR_ACT", bytes));
     runner.Run(spec.num_ticks() - act.tick);
-    EXPECT_EQ(plan.step_reason, support_plan_t::REASON_TOGETHER) << world;
-    EXPECT_EQ(plan.stepping, support_plan_t::STEPPING_NONE) << world;
+    EXPECT_EQ(planner.step_reason, planner_status_t::REASON_TOGETHER) << world;
+    EXPECT_EQ(planner.stepping, planner_status_t::STEPPING_NONE) << world;
     const Eigen::Vector3d left =
         PoseOf(truth.foot_pose[0]).inverse() * PoseOf(truth.foot_pose[1]).translation();
     EXPECT_NEAR(left.x(), 0, 0.05) << world;

@@ -16,7 +16,7 @@ TEST(FieldTable, UnitsAreThoseOfTheComments) {
   EXPECT_EQ(UnitOf("joint_command_t", "torque[right_knee_pitch]"), "N·m");
   EXPECT_EQ(UnitOf("joint_command_t", "foot_wrench[left].force[2]"), "N");
   EXPECT_EQ(UnitOf("joint_command_t", "foot_wrench[1].moment[0]"), "N·m");
-  EXPECT_EQ(UnitOf("support_plan_t", "step_time"), "s");        // "s from now, by when"
+  EXPECT_EQ(UnitOf("planner_status_t", "step_time"), "s");      // "s from now, by when"
   EXPECT_EQ(UnitOf("bridge_status_t", "thermal_load[0]"), "");  // "share of ..."
   EXPECT_EQ(UnitOf("bridge_status_t", "no_such_field"), "");
   EXPECT_EQ(UnitOf("no_such_t", "torque"), "");

@@ -28,10 +28,10 @@ TEST_F(AnalysisTest, MetricsHaveNamesOfTheirOwn) {
 TEST_F(AnalysisTest, ComErrorIsTheLargestAfterTheWindowBegins) {
   for (size_t t = 0; t < kTicks; ++t) {
     plan_[t].com_reference.position[1] = 0.01;
-    plan_[t].com_position[1] = 0.01 - 1e-4 * static_cast<double>(t);
+    planner_[t].com_position[1] = 0.01 - 1e-4 * static_cast<double>(t);
     truth_[t].com_position[1] = 0.01 + 2e-4 * static_cast<double>(t);
   }
-  plan_[3].com_position[1] = 1;  // before the window
+  planner_[3].com_position[1] = 1;  // before the window
   EXPECT_NEAR(Measure("com_error_max_y", 0.01), 9.9, 1e-9);
   EXPECT_NEAR(Measure("com_error_max_y"), 990, 1e-9);
   EXPECT_NEAR(Measure("com_error_true_max_y"), 19.8, 1e-9);

@@ -53,10 +53,10 @@ class EventsTest : public RecordTest {
   /// The left foot off the ground from tick 20 on, in phase 1.
   void LiftLeft() {
     for (size_t t = 20; t < kTicks; ++t) {
-      plan_[t].phase = 1;
+      planner_[t].phase = 1;
       plan_[t].in_contact[1] = command_[t].in_contact[1] = 0;
-      plan_[t].foot_state[1] = support_plan_t::FOOT_SWING;
-      plan_[t].foot_pose[1].position[2] = plan_[t].foot_reference[1].position[2] = 0.12;
+      planner_[t].foot_state[1] = planner_status_t::FOOT_SWING;
+      planner_[t].foot_pose[1].position[2] = plan_[t].foot_reference[1].position[2] = 0.12;
     }
   }
   std::vector<Event> Named(const std::string& name) {
@@ -137,8 +137,9 @@ TEST_F(EventsTest, PhasesCarryTheirNames) {
 TEST_F(EventsTest, APhaseSaysWhatTheOneBeforeCameTo) {
   Plan(StepDown());
   for (size_t t = 20; t < kTicks; ++t) {
-    plan_[t].phase = t < 60 ? 1 : 0;
-    plan_[t].began_by = t < 60 ? support_plan_t::OUTCOME_DONE : support_plan_t::OUTCOME_NO_SURFACE;
+    planner_[t].phase = t < 60 ? 1 : 0;
+    planner_[t].began_by =
+        t < 60 ? planner_status_t::OUTCOME_DONE : planner_status_t::OUTCOME_NO_SURFACE;
   }
   EXPECT_THAT(Named("phase_began"),
               ElementsAre(Field(&Event::detail, "phase 0, stand"),
@@ -149,8 +150,9 @@ TEST_F(EventsTest, APhaseSaysWhatTheOneBeforeCameTo) {
 // Its time begins anew.
 TEST_F(EventsTest, APhaseThatFollowsItselfBeginsAgain) {
   for (size_t t = 0; t < kTicks; ++t) {
-    plan_[t].phase_time = kPeriod * static_cast<double>(t % 50);
-    plan_[t].began_by = t < 50 ? support_plan_t::OUTCOME_NONE : support_plan_t::OUTCOME_TIMEOUT;
+    planner_[t].phase_time = kPeriod * static_cast<double>(t % 50);
+    planner_[t].began_by =
+        t < 50 ? planner_status_t::OUTCOME_NONE : planner_status_t::OUTCOME_TIMEOUT;
   }
   EXPECT_THAT(Named("phase_began"),
               ElementsAre(Is(0, "phase_began"), Is(0.1, "phase_began", "waited for too long")));
@@ -170,8 +172,8 @@ TEST_F(EventsTest, TheReferencesEndIsThatOfThePhaseThatFollows) {
   Plan(config);
   LiftLeft();
   for (size_t t = 50; t < kTicks; ++t) {
-    plan_[t].foot_state[1] = support_plan_t::FOOT_TOUCHING;
-    plan_[t].foot_pose[1].position[2] = 0.125;
+    planner_[t].foot_state[1] = planner_status_t::FOOT_TOUCHING;
+    planner_[t].foot_pose[1].position[2] = 0.125;
   }
   EXPECT_THAT(Named("contact_early"), ElementsAre(Is(0.1, "contact_early", "75.0 mm above")));
 }
@@ -199,7 +201,7 @@ TEST_F(EventsTest, SupportChangeNamesTheJointOfTheLargestStep) {
 TEST_F(EventsTest, TransitionsAndWaiting) {
   for (size_t t = 5; t < 10; ++t) {
     plan_[t].status = support_plan_t::STATUS_WAITING;
-    plan_[t].waiting_for = support_plan_t::WAITING_COM;
+    planner_[t].waiting_for = planner_status_t::WAITING_COM;
   }
   for (size_t t = 10; t < 20; ++t) {
     plan_[t].transition = support_plan_t::TRANSITION_UNLOADING;
@@ -209,7 +211,8 @@ TEST_F(EventsTest, TransitionsAndWaiting) {
     plan_[t].transition = support_plan_t::TRANSITION_LOADING;
     plan_[t].transition_foot = 0;
   }
-  for (size_t t = 60; t < kTicks; ++t) plan_[t].waiting_for = support_plan_t::WAITING_NO_SURFACE;
+  for (size_t t = 60; t < kTicks; ++t)
+    planner_[t].waiting_for = planner_status_t::WAITING_NO_SURFACE;
   EXPECT_THAT(
       Events(Read()),
       ElementsAre(Is(0, "phase_began"), Is(0.01, "waiting_begins", "above the stance sole"),
@@ -224,8 +227,8 @@ TEST_F(EventsTest, AContactAboveTheReferencesEndIsEarly) {
   Plan(StepDown());
   LiftLeft();
   for (size_t t = 50; t < kTicks; ++t) {
-    plan_[t].foot_state[1] = support_plan_t::FOOT_TOUCHING;
-    plan_[t].foot_pose[1].position[2] = 0.115;
+    planner_[t].foot_state[1] = planner_status_t::FOOT_TOUCHING;
+    planner_[t].foot_pose[1].position[2] = 0.115;
   }
   EXPECT_THAT(Named("touch_down"), ElementsAre(Is(0.1, "touch_down", "left foot, 115.0 mm above")));
   EXPECT_THAT(Named("contact_early"),
@@ -238,8 +241,8 @@ TEST_F(EventsTest, ASoleThatBouncesTouchesDownOnce) {
   Plan(StepDown());
   LiftLeft();
   for (size_t t = 50; t < kTicks; ++t) {
-    plan_[t].foot_state[1] =
-        t % 20 < 10 ? support_plan_t::FOOT_TOUCHING : support_plan_t::FOOT_SWING;
+    planner_[t].foot_state[1] =
+        t % 20 < 10 ? planner_status_t::FOOT_TOUCHING : planner_status_t::FOOT_SWING;
   }
   EXPECT_THAT(Named("touch_down"), ElementsAre(Is(0.12, "touch_down", "left foot")));
   EXPECT_EQ(Named("contact_early").size(), 1u);
@@ -253,8 +256,8 @@ TEST_F(EventsTest, AContactWhileTheFootHoversIsEarly) {
   Plan(config);
   LiftLeft();
   for (size_t t = 50; t < kTicks; ++t) {
-    plan_[t].foot_state[1] = support_plan_t::FOOT_TOUCHING;
-    plan_[t].foot_pose[1].position[2] = 0.125;  // 5 mm above where it hovers
+    planner_[t].foot_state[1] = planner_status_t::FOOT_TOUCHING;
+    planner_[t].foot_pose[1].position[2] = 0.125;  // 5 mm above where it hovers
   }
   EXPECT_THAT(Named("contact_early"), ElementsAre(Is(0.1, "contact_early", "35.0 mm above")));
 }
@@ -262,10 +265,10 @@ TEST_F(EventsTest, AContactWhileTheFootHoversIsEarly) {
 TEST_F(EventsTest, AContactFoundBySearchingIsLate) {
   Plan(StepDown());
   LiftLeft();
-  for (size_t t = 30; t < 50; ++t) plan_[t].foot_state[1] = support_plan_t::FOOT_SEARCHING;
+  for (size_t t = 30; t < 50; ++t) planner_[t].foot_state[1] = planner_status_t::FOOT_SEARCHING;
   for (size_t t = 50; t < kTicks; ++t) {
-    plan_[t].foot_state[1] = support_plan_t::FOOT_SUPPORT;
-    plan_[t].foot_pose[1].position[2] = 0.06;
+    planner_[t].foot_state[1] = planner_status_t::FOOT_SUPPORT;
+    planner_[t].foot_pose[1].position[2] = 0.06;
   }
   EXPECT_THAT(Named("searching"), ElementsAre(Is(0.06, "searching", "left foot")));
   EXPECT_THAT(Named("touch_down"), ElementsAre(Is(0.1, "touch_down", "60.0 mm")));
@@ -277,8 +280,8 @@ TEST_F(EventsTest, AContactNearTheReferencesEndIsAsExpected) {
   Plan(config);
   LiftLeft();
   for (size_t t = 50; t < kTicks; ++t) {
-    plan_[t].foot_state[1] = support_plan_t::FOOT_TOUCHING;
-    plan_[t].foot_pose[1].position[2] = 0.095;  // 5 mm above its end
+    planner_[t].foot_state[1] = planner_status_t::FOOT_TOUCHING;
+    planner_[t].foot_pose[1].position[2] = 0.095;  // 5 mm above its end
   }
   EXPECT_EQ(Named("touch_down").size(), 1u);
   EXPECT_TRUE(Named("contact_early").empty());
@@ -290,15 +293,15 @@ TEST_F(EventsTest, AReferenceWithoutHeightEndsBelowWhereItBegan) {
   config.mutable_phase(1)->mutable_foot()->set_z(-0.1);  // from 0.12 to 0.02
   Plan(config);
   LiftLeft();
-  for (size_t t = 50; t < kTicks; ++t) plan_[t].foot_state[1] = support_plan_t::FOOT_TOUCHING;
+  for (size_t t = 50; t < kTicks; ++t) planner_[t].foot_state[1] = planner_status_t::FOOT_TOUCHING;
   EXPECT_THAT(Named("contact_early"), ElementsAre(Is(0.1, "contact_early", "100.0 mm above")));
 }
 
 TEST_F(EventsTest, NoSurface) {
   LiftLeft();
   for (size_t t = 50; t < kTicks; ++t) {
-    plan_[t].foot_state[1] = support_plan_t::FOOT_RETRACTED;
-    plan_[t].foot_pose[1].position[2] = -0.06;
+    planner_[t].foot_state[1] = planner_status_t::FOOT_RETRACTED;
+    planner_[t].foot_pose[1].position[2] = -0.06;
   }
   EXPECT_THAT(Named("no_surface"), ElementsAre(Is(0.1, "no_surface", "-60.0 mm")));
 }
@@ -358,30 +361,30 @@ TEST_F(EventsTest, ACentreOfPressureThatIsNotKeptIsNeverCalledWithinItsLimits) {
 
 TEST_F(EventsTest, AStepThatAWalkMakesAnywayIsNotCalledFor) {
   for (size_t t = 30; t < 80; ++t) {
-    support_plan_t& plan = plan_[t];
-    plan.step_needed = 1;
-    plan.capture_margin = -0.05;
-    plan.stepping = support_plan_t::STEPPING_SWINGING;
-    plan.step_reason = support_plan_t::REASON_WALK;
-    plan.step_foot = 1;
-    plan.foot_pose[0].position[1] = -0.1;
-    plan.foothold[0] = 0.3;
-    plan.foothold[1] = 0.1;
-    plan.capture_point[0] = 0.15;
-    plan.capture_point[1] = t < 60 ? 0 : -0.5;  // pushed aside
+    planner_status_t& planner = planner_[t];
+    planner.step_needed = 1;
+    planner.capture_margin = -0.05;
+    planner.stepping = planner_status_t::STEPPING_SWINGING;
+    planner.step_reason = planner_status_t::REASON_WALK;
+    planner.step_foot = 1;
+    planner.foot_pose[0].position[1] = -0.1;
+    planner.foothold[0] = 0.3;
+    planner.foothold[1] = 0.1;
+    planner.capture_point[0] = 0.15;
+    planner.capture_point[1] = t < 60 ? 0 : -0.5;  // pushed aside
   }
   EXPECT_THAT(Named("step_needed"), ElementsAre(Is(0.12, "step_needed", "a foot at")));
-  for (size_t t = 30; t < 80; ++t) plan_[t].step_reason = support_plan_t::REASON_OUTSIDE;
+  for (size_t t = 30; t < 80; ++t) planner_[t].step_reason = planner_status_t::REASON_OUTSIDE;
   EXPECT_THAT(Named("step_needed"), ElementsAre(Is(0.06, "step_needed", "a foot at")));
 }
 
 TEST_F(EventsTest, AStepThatIsNeededSaysWhereAndByWhen) {
   for (size_t t = 30; t < 60; ++t) {
-    plan_[t].step_needed = 1;
-    plan_[t].capture_margin = -0.0125;
-    plan_[t].step_position[0] = 0.1;
-    plan_[t].step_position[1] = -0.45;
-    plan_[t].step_time = 0.32;
+    planner_[t].step_needed = 1;
+    planner_[t].capture_margin = -0.0125;
+    planner_[t].step_position[0] = 0.1;
+    planner_[t].step_position[1] = -0.45;
+    planner_[t].step_time = 0.32;
   }
   EXPECT_THAT(Named("step_needed"),
               ElementsAre(Is(0.06, "step_needed",
@@ -396,20 +399,20 @@ class StepEventsTest : public EventsTest {
  protected:
   StepEventsTest() {
     for (size_t t = 0; t < kTicks; ++t) {
-      support_plan_t& plan = plan_[t];
-      plan.step_foot = t < 30 ? -1 : 1;
-      plan.num_steps = t < 30 ? 0 : 1;
-      plan.step_reason = support_plan_t::REASON_OUTSIDE;
-      plan.stepping = t < 30   ? support_plan_t::STEPPING_NONE
-                      : t < 60 ? support_plan_t::STEPPING_SWINGING
-                      : t < 80 ? support_plan_t::STEPPING_LOADING
-                               : support_plan_t::STEPPING_NONE;
-      plan.foothold[0] = t < 40 ? 0.3 : 0.32;
-      plan.foothold[1] = 0.1;
-      plan.foot_pose[1].position[0] = t < 60 ? 0 : 0.31;
-      plan.foot_pose[1].position[1] = 0.1;
-      plan.capture_margin = -0.0125;
-      plan.foothold_margin = 0.04;
+      planner_status_t& planner = planner_[t];
+      planner.step_foot = t < 30 ? -1 : 1;
+      planner.num_steps = t < 30 ? 0 : 1;
+      planner.step_reason = planner_status_t::REASON_OUTSIDE;
+      planner.stepping = t < 30   ? planner_status_t::STEPPING_NONE
+                         : t < 60 ? planner_status_t::STEPPING_SWINGING
+                         : t < 80 ? planner_status_t::STEPPING_LOADING
+                                  : planner_status_t::STEPPING_NONE;
+      planner.foothold[0] = t < 40 ? 0.3 : 0.32;
+      planner.foothold[1] = 0.1;
+      planner.foot_pose[1].position[0] = t < 60 ? 0 : 0.31;
+      planner.foot_pose[1].position[1] = 0.1;
+      planner.capture_margin = -0.0125;
+      planner.foothold_margin = 0.04;
     }
   }
 };
@@ -427,9 +430,9 @@ TEST_F(StepEventsTest, AStepThatLandsSaysWhereBesideThePlan) {
 }
 
 TEST_F(StepEventsTest, AStepOfAWalkPlansNoCapturePoint) {
-  for (support_plan_t& plan : plan_) {
-    plan.step_reason = support_plan_t::REASON_WALK;
-    plan.capture_margin = 0.07;
+  for (planner_status_t& planner : planner_) {
+    planner.step_reason = planner_status_t::REASON_WALK;
+    planner.capture_margin = 0.07;
   }
   EXPECT_THAT(Named("step_lands"),
               ElementsAre(Field(&Event::detail, testing::EndsWith("70.0 mm inside the soles"))));

@@ -23,7 +23,9 @@ constexpr double kWeight = 1000;  // N, on a foot that carries: more than enough
 
 class ForeignControllerTest : public RecordTest {
  protected:
-  ForeignControllerTest() { without_ = {"SUPPORT_PLAN", "TASK_TORQUE", "BALANCE_TORQUE"}; }
+  ForeignControllerTest() {
+    without_ = {"SUPPORT_PLAN", "PLANNER_STATUS", "TASK_TORQUE", "BALANCE_TORQUE"};
+  }
 
   /// A command of torques or impedance alone.
   void SayNothing() {
@@ -98,7 +100,7 @@ TEST_F(ForeignControllerTest, ARatioThatIsToldToBeInfeasibleIsKnown) {
 TEST_F(ForeignControllerTest, CentresOfPressureOfSensorsAndCommandAlone) {
   for (size_t t = 0; t < kTicks; ++t) {
     for (size_t foot = 0; foot < 2; ++foot) {
-      truth_[t].foot_pose[foot] = plan_[t].foot_pose[foot];
+      truth_[t].foot_pose[foot] = planner_[t].foot_pose[foot];
       const double load = foot == 0 ? 100 : 300;
       sensors_[t].foot_wrench[foot].force[2] = -load;
       command_[t].foot_wrench[foot].force[2] = foot == 0 ? -300 : -100;
@@ -130,13 +132,13 @@ TEST_F(ForeignControllerTest, StepsWayAndCostAreTheTruths) {
   EXPECT_NEAR(Measure("walk_cost_of_transport"), 10 * 1.2 / (weight * 0.6), 1e-9);
   EXPECT_TRUE(Unanswered("walk_velocity_error_rms"));
   EXPECT_THAT(Missing("walk_velocity_error_rms"),
-              ElementsAre("SUPPORT_PLAN.walk_velocity, step_reason"));
+              ElementsAre("PLANNER_STATUS.walk_velocity, step_reason"));
 }
 
 // A planner that stands while the robot walks is not believed, and one that walks while it stands
 // neither.
 TEST_F(ForeignControllerTest, APlanThatNobodyFollowsChangesNoStep) {
-  without_.erase("SUPPORT_PLAN");
+  without_ = {"TASK_TORQUE", "BALANCE_TORQUE"};
   Walk(0.5);
   EXPECT_EQ(Measure("steps"), 5);
   EXPECT_TRUE(Unanswered("walk_velocity_error_rms"));
@@ -145,8 +147,8 @@ TEST_F(ForeignControllerTest, APlanThatNobodyFollowsChangesNoStep) {
     for (wrench_t& wrench : truth.foot_wrench) wrench.force[2] = -kWeight;
   }
   for (size_t t = 50; t < kTicks; ++t) {
-    plan_[t].num_steps = 3;
-    plan_[t].step_reason = support_plan_t::REASON_WALK;
+    planner_[t].num_steps = 3;
+    planner_[t].step_reason = planner_status_t::REASON_WALK;
   }
   EXPECT_EQ(Measure("steps"), 0);
   EXPECT_TRUE(Unanswered("walk_way"));
@@ -157,11 +159,11 @@ TEST_F(ForeignControllerTest, ASlowWalkIsOneWhereThePlannerWalksOn) {
   Walk(0.5);
   spec_.set_tick_period(0.3);  // 1.5 s on both feet between two swings
   EXPECT_TRUE(Unanswered("walk_way"));
-  without_.erase("SUPPORT_PLAN");
+  without_ = {"TASK_TORQUE", "BALANCE_TORQUE"};
   EXPECT_TRUE(Unanswered("walk_way"));
-  for (support_plan_t& plan : plan_) {
-    plan.stepping = support_plan_t::STEPPING_UNLOADING;
-    plan.step_reason = support_plan_t::REASON_WALK;
+  for (planner_status_t& planner : planner_) {
+    planner.stepping = planner_status_t::STEPPING_UNLOADING;
+    planner.step_reason = planner_status_t::REASON_WALK;
   }
   EXPECT_NEAR(Measure("walk_way"), 0.6, 1e-9);
 }
@@ -285,9 +287,9 @@ TEST_F(ForeignControllerTest, EveryMetricNeedsWhatIsSaid) {
     }
     if (t >= 30 && t < 60) {
       plan_[t].in_contact[1] = command_[t].in_contact[1] = 0;
-      plan_[t].foot_state[1] = support_plan_t::FOOT_SWING;
-      plan_[t].stepping = support_plan_t::STEPPING_SWINGING;
-      plan_[t].step_reason = support_plan_t::REASON_WALK;
+      planner_[t].foot_state[1] = planner_status_t::FOOT_SWING;
+      planner_[t].stepping = planner_status_t::STEPPING_SWINGING;
+      planner_[t].step_reason = planner_status_t::REASON_WALK;
     }
   }
   RunRecord run = Read();
@@ -295,6 +297,7 @@ TEST_F(ForeignControllerTest, EveryMetricNeedsWhatIsSaid) {
     if (channel == "ROBOT_SENSORS") record->sensors = {};
     if (channel == "ROBOT_STATE") record->state = {};
     if (channel == "SUPPORT_PLAN") record->plan = {};
+    if (channel == "PLANNER_STATUS") record->planner = {};
     if (channel == "TASK_TORQUE") record->task = {};
     if (channel == "BALANCE_TORQUE") record->balance = {};
     if (channel == "JOINT_COMMAND") record->command = {};
@@ -311,8 +314,8 @@ TEST_F(ForeignControllerTest, EveryMetricNeedsWhatIsSaid) {
     ++known;
     EXPECT_THAT(MissingFor(metric, run), IsEmpty()) << metric.name;
     for (const char* channel :
-         {"ROBOT_SENSORS", "ROBOT_STATE", "SUPPORT_PLAN", "TASK_TORQUE", "BALANCE_TORQUE",
-          "JOINT_COMMAND", "EXTERNAL_PUSH", "GROUND_TRUTH"}) {
+         {"ROBOT_SENSORS", "ROBOT_STATE", "SUPPORT_PLAN", "PLANNER_STATUS", "TASK_TORQUE",
+          "BALANCE_TORQUE", "JOINT_COMMAND", "EXTERNAL_PUSH", "GROUND_TRUTH"}) {
       if (metric.needs.find(channel) != std::string::npos) continue;
       RunRecord less = run;
       drop(&less, channel);

@@ -26,7 +26,7 @@ class MetricsTest : public RecordTest {
   void LiftLeft(size_t from, size_t to) {
     for (size_t t = from; t < to; ++t) {
       plan_[t].in_contact[1] = command_[t].in_contact[1] = 0;
-      plan_[t].foot_state[1] = support_plan_t::FOOT_SWING;
+      planner_[t].foot_state[1] = planner_status_t::FOOT_SWING;
     }
   }
 
@@ -174,7 +174,7 @@ TEST_F(MetricsTest, SinkIsFromTheConfirmedContactToTheNextLift) {
   EXPECT_TRUE(Unanswered("left_foot_sink"));
   LiftLeft(10, 40);
   LiftLeft(80, kTicks);
-  for (size_t t = 30; t < 40; ++t) plan_[t].foot_state[1] = support_plan_t::FOOT_TOUCHING;
+  for (size_t t = 30; t < 40; ++t) planner_[t].foot_state[1] = planner_status_t::FOOT_TOUCHING;
   for (size_t t = 0; t < kTicks; ++t) {
     // Sinks 1 mm a tick from 30 on, to 12 mm; later in the air it is far lower.
     const double sunk = std::clamp(static_cast<double>(t) - 30, 0.0, 12.0);
@@ -184,7 +184,7 @@ TEST_F(MetricsTest, SinkIsFromTheConfirmedContactToTheNextLift) {
   EXPECT_TRUE(Unanswered("right_foot_sink"));
   EXPECT_NEAR(Measure("touch_down"), 0.06, 1e-12);
   // Nothing confirms: from the first tick of support on.
-  for (size_t t = 30; t < 40; ++t) plan_[t].foot_state[1] = support_plan_t::FOOT_SWING;
+  for (size_t t = 30; t < 40; ++t) planner_[t].foot_state[1] = planner_status_t::FOOT_SWING;
   EXPECT_NEAR(Measure("left_foot_sink"), 2, 1e-9);
   EXPECT_TRUE(Unanswered("touch_down"));
 }
@@ -204,9 +204,9 @@ TEST_F(MetricsTest, EarlyAndLateContacts) {
   EXPECT_EQ(Measure("late_contacts"), 0);
 
   LiftLeft(10, 90);
-  for (size_t t = 0; t < kTicks; ++t) plan_[t].phase = t < 10 ? 0 : 1;
-  for (size_t t = 50; t < 60; ++t) plan_[t].foot_state[1] = support_plan_t::FOOT_TOUCHING;
-  for (size_t t = 70; t < 90; ++t) plan_[t].foot_state[1] = support_plan_t::FOOT_RETRACTED;
+  for (size_t t = 0; t < kTicks; ++t) planner_[t].phase = t < 10 ? 0 : 1;
+  for (size_t t = 50; t < 60; ++t) planner_[t].foot_state[1] = planner_status_t::FOOT_TOUCHING;
+  for (size_t t = 70; t < 90; ++t) planner_[t].foot_state[1] = planner_status_t::FOOT_RETRACTED;
   EXPECT_EQ(Measure("no_surface_stops"), 1);
   EXPECT_EQ(Measure("no_surface_stops", 0.15), 0);
   EXPECT_EQ(Measure("early_contacts"), 1);
@@ -284,10 +284,10 @@ TEST_F(MetricsTest, WarningTimeIsFromTheAnnouncementThatHoldsToTheFall) {
   EXPECT_EQ(Measure("step_needed_time"), 0);
   for (size_t t = 90; t < 100; ++t) truth_[t].fallen = 1;
   EXPECT_EQ(Measure("step_warning_time"), 0);  // not announced
-  for (size_t t = 20; t < 25; ++t) plan_[t].step_needed = 1;
+  for (size_t t = 20; t < 25; ++t) planner_[t].step_needed = 1;
   EXPECT_EQ(Measure("step_warning_time"), 0);  // taken back before
-  for (size_t t = 40; t < 100; ++t) plan_[t].step_needed = 1;
-  plan_[55].capture_margin = -0.03;
+  for (size_t t = 40; t < 100; ++t) planner_[t].step_needed = 1;
+  planner_[55].capture_margin = -0.03;
   EXPECT_NEAR(Measure("step_warning_time"), 50 * kPeriod, 1e-12);
   EXPECT_NEAR(Measure("step_needed_first"), 20 * kPeriod, 1e-12);
   EXPECT_NEAR(Measure("step_needed_time"), 65 * kPeriod, 1e-12);

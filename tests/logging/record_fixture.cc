@@ -29,6 +29,7 @@ RecordTest::RecordTest() {
     sensors_.push_back(Sized<robot_sensors_t>(t));
     state_.push_back(Sized<robot_state_t>(t));
     plan_.push_back(Sized<support_plan_t>(t));
+    planner_.push_back(Sized<planner_status_t>(t));
     task_.push_back(Sized<task_torque_t>(t));
     balance_.push_back(Sized<balance_torque_t>(t));
     command_.push_back(Sized<joint_command_t>(t));
@@ -43,8 +44,8 @@ RecordTest::RecordTest() {
     plan_.back().transition_foot = -1;
     command_.back().eta_feasible = 1;
     for (size_t foot = 0; foot < 2; ++foot) {
-      SetIdentity(&plan_.back().foot_pose[foot]);
-      plan_.back().foot_pose[foot].position[1] = foot == 0 ? -0.105 : 0.105;
+      SetIdentity(&planner_.back().foot_pose[foot]);
+      planner_.back().foot_pose[foot].position[1] = foot == 0 ? -0.105 : 0.105;
       plan_.back().in_contact[foot] = command_.back().in_contact[foot] = 1;
       command_.back().conditions_met[foot] = 1;
       command_.back().margins[foot] = {1, 1, 1, 1, 1};
@@ -61,6 +62,7 @@ RunRecord RecordTest::Read() {
     add("ROBOT_SENSORS", sensors_[t]);
     add("ROBOT_STATE", state_[t]);
     add("SUPPORT_PLAN", plan_[t]);
+    add("PLANNER_STATUS", planner_[t]);
     add("TASK_TORQUE", task_[t]);
     add("BALANCE_TORQUE", balance_[t]);
     add("JOINT_COMMAND", command_[t]);

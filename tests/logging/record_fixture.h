@@ -42,6 +42,7 @@ class RecordTest : public testing::Test {
   std::vector<robot_sensors_t> sensors_;
   std::vector<robot_state_t> state_;
   std::vector<support_plan_t> plan_;
+  std::vector<planner_status_t> planner_;
   std::vector<task_torque_t> task_;
   std::vector<balance_torque_t> balance_;
   std::vector<joint_command_t> command_;

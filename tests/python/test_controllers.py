@@ -48,7 +48,7 @@ def make_types():
         graph = file.read()
     for name in ("step_planner", "task_controller", "contact_wrench_monitor", "redistributor"):
         graph = re.sub(r'component \{\n  name: "%s"\n(.*\n)*?\}\n' % name, "", graph)
-    for channel in ("SUPPORT_PLAN", "TASK_TORQUE", "BALANCE_TORQUE"):
+    for channel in ("SUPPORT_PLAN", "PLANNER_STATUS", "TASK_TORQUE", "BALANCE_TORQUE"):
         graph = re.sub(r'channel \{ name: "%s" .*\n' % channel, "", graph)
     for name, impedance in (("impedance", True), ("torque", False)):
         program = os.path.join(FOLDER, "lib/poise/bin", name)
@@ -135,7 +135,7 @@ class Judged(unittest.TestCase):
                 outputs.joint_command[field][...] = getattr(played, field)[tick.index]
 
         run, checks, shown = self.run_it("walk", "torque", holder(False, step=plays))
-        for channel in ("SUPPORT_PLAN", "TASK_TORQUE", "BALANCE_TORQUE"):
+        for channel in ("SUPPORT_PLAN", "PLANNER_STATUS", "TASK_TORQUE", "BALANCE_TORQUE"):
             with self.assertRaises(KeyError):
                 run[channel]
         self.assertTrue(run.passed, shown.stdout)

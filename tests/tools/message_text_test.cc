@@ -29,14 +29,14 @@ TEST(MessageTextTest, ALineHasEachFieldByItsPath) {
   EXPECT_EQ(MessageLine(std::nullopt, {kFields[3]}), "foot_wrench[0].force[0]=1e-09\n");
 }
 
-// The numbers are those of lcmtypes/support_plan_t.lcm.
+// The numbers are those of lcmtypes/planner_status_t.lcm.
 TEST(MessageTextTest, AnEnumerationsValueHasItsName) {
-  EXPECT_EQ(ValueName("support_plan_t", "stepping", 3), "LOADING");
-  EXPECT_EQ(ValueName("support_plan_t", "step_reason", 5), "WALK");
-  EXPECT_EQ(ValueName("support_plan_t", "step_reason", 7), "LINGERING");
-  EXPECT_EQ(ValueName("support_plan_t", "foot_state[1]", 2), "SEARCHING");
-  EXPECT_EQ(ValueName("support_plan_t", "stepping", 99), "");
-  EXPECT_EQ(ValueName("support_plan_t", "phase", 0), "");
+  EXPECT_EQ(ValueName("planner_status_t", "stepping", 3), "LOADING");
+  EXPECT_EQ(ValueName("planner_status_t", "step_reason", 5), "WALK");
+  EXPECT_EQ(ValueName("planner_status_t", "step_reason", 7), "LINGERING");
+  EXPECT_EQ(ValueName("planner_status_t", "foot_state[1]", 2), "SEARCHING");
+  EXPECT_EQ(ValueName("planner_status_t", "stepping", 99), "");
+  EXPECT_EQ(ValueName("planner_status_t", "phase", 0), "");
   EXPECT_EQ(ValueName("no_such_t", "stepping", 3), "");
   const Scalar stepping{"stepping", int64_t{3}, "LOADING"};
   EXPECT_EQ(MessageLine(12, {stepping}), "tick=12 stepping=3(LOADING)\n");

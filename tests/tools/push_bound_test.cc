@@ -169,12 +169,12 @@ TEST(PushBound, AStepCatchesWhatComesDuringItAtItsReach) {
     external_push_t push{};
     push.force[0] = tick == 1 ? 100 : 0;
     run.push.Set(tick, push);
-    support_plan_t plan{};
-    plan.stepping = tick == 2   ? support_plan_t::STEPPING_UNLOADING
-                    : tick == 3 ? support_plan_t::STEPPING_SWINGING
-                                : support_plan_t::STEPPING_NONE;
-    if (tick == 4) plan.stepping = support_plan_t::STEPPING_SWINGING;
-    run.plan.Set(tick, plan);
+    planner_status_t planner{};
+    planner.stepping = tick == 2   ? planner_status_t::STEPPING_UNLOADING
+                       : tick == 3 ? planner_status_t::STEPPING_SWINGING
+                                   : planner_status_t::STEPPING_NONE;
+    if (tick == 4) planner.stepping = planner_status_t::STEPPING_SWINGING;
+    run.planner.Set(tick, planner);
   }
   Scenario scenario = PushScenario("direction_x: 1");
   EXPECT_EQ(FindPushBound(scenario, run)->step_time, 0) << "no recovery, no step";

@@ -21,7 +21,7 @@ class UnknownChecksTest : public logging::RecordTest {
  protected:
   UnknownChecksTest() {
     spec_.set_num_ticks(kTicks);
-    without_ = {"SUPPORT_PLAN", "TASK_TORQUE", "BALANCE_TORQUE"};
+    without_ = {"SUPPORT_PLAN", "PLANNER_STATUS", "TASK_TORQUE", "BALANCE_TORQUE"};
     Limit("fallen", 0);
     Limit("com_error_end", 10);
   }
@@ -143,7 +143,8 @@ TEST_F(UnknownChecksTest, AWalkIsNoStandWhateverTheCommandSays) {
   EXPECT_THAT(text, Not(HasSubstr("on both feet to the end")));
   EXPECT_THAT(text, HasSubstr("changed its support 10 times"));
   EXPECT_THAT(text, HasSubstr("and stood to the end"));
-  EXPECT_THAT(text, HasSubstr("It walked 5 steps, a way of 0.6 m between touch-downs, at up to 0.5 m/s."));
+  EXPECT_THAT(
+      text, HasSubstr("It walked 5 steps, a way of 0.6 m between touch-downs, at up to 0.5 m/s."));
 }
 
 TEST_F(UnknownChecksTest, AWalkThatGoesOnAtTheEndIsNoStand) {
@@ -174,7 +175,8 @@ TEST_F(UnknownChecksTest, ReadingsOfNoPushAreNoPush) {
   EXPECT_THAT(TellRun(run, {}, logging::Events(run), ""), Not(HasSubstr("ushed")));
   for (size_t t = 0; t < kTicks; ++t) push_[t].force[t % 3] = t % 2 == 0 ? 0.3 : -0.3;
   EXPECT_THAT(Tell(), Not(HasSubstr("ushed")));
-  for (const char* metric : {"push_peak", "push_impulse"}) EXPECT_TRUE(Unanswered(metric)) << metric;
+  for (const char* metric : {"push_peak", "push_impulse"})
+    EXPECT_TRUE(Unanswered(metric)) << metric;
   push_[50].force[1] = 20;
   EXPECT_NEAR(Measure("push_peak"), 20, 0.1);
   EXPECT_THAT(Tell(), HasSubstr("Pushed from the right with up to 20.0 N"));

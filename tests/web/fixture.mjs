@@ -22,8 +22,8 @@ function paths(type, source) {
 }
 const sourceOf = (type) => sources.get(type);
 
-const TYPES = ['drive_feedback_t', 'robot_sensors_t', 'robot_state_t', 'estimator_status_t', 'support_plan_t', 'task_torque_t', 'balance_torque_t',
-  'joint_command_t', 'bridge_status_t', 'external_push_t', 'ground_truth_t', 'steps.footsteps_t'];
+const TYPES = ['drive_feedback_t', 'robot_sensors_t', 'robot_state_t', 'estimator_status_t', 'support_plan_t', 'planner_status_t', 'task_torque_t',
+  'balance_torque_t', 'joint_command_t', 'bridge_status_t', 'external_push_t', 'ground_truth_t', 'steps.footsteps_t'];
 
 /** A robot with a pitch and a roll joint in the right leg, none in the left. */
 export const robot = {

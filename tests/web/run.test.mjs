@@ -94,8 +94,8 @@ test('pitch joints are found by their axis', () => {
 
 test('measured centre of pressure of two soles, closed form', async () => {
   const load = {'robot_sensors_t.foot_wrench[0].force[2]': -300, 'robot_sensors_t.foot_wrench[1].force[2]': -100,
-    'support_plan_t.foot_pose[0].position[1]': -0.1, 'support_plan_t.foot_pose[1].position[1]': 0.1,
-    'support_plan_t.foot_pose[0].orientation[0]': 1, 'support_plan_t.foot_pose[1].orientation[0]': 1,
+    'planner_status_t.foot_pose[0].position[1]': -0.1, 'planner_status_t.foot_pose[1].position[1]': 0.1,
+    'planner_status_t.foot_pose[0].orientation[0]': 1, 'planner_status_t.foot_pose[1].orientation[0]': 1,
     'balance_torque_t.frame_o.orientation[0]': 1, 'support_plan_t.in_contact[0]': 1, 'support_plan_t.in_contact[1]': 1};
   const y = await valuesOf(makeRun('', load), 'derived.cop_measured_y');
   assert.ok(Number.isNaN(y[0]));  // no tick before
@@ -146,7 +146,7 @@ test('a run grows by ticks, and what follows from its signals with it', async ()
   const push = await valuesOf(run, 'EXTERNAL_PUSH.force[1]');
   assert.equal(push.length, 3500);
   assert.deepEqual([push[699], push[700], push[3499]], [0, 4, 16]);
-  assert.ok(Number.isNaN((await valuesOf(run, 'SUPPORT_PLAN.phase'))[10]));
+  assert.ok(Number.isNaN((await valuesOf(run, 'PLANNER_STATUS.phase'))[10]));
   const size = await valuesOf(run, 'derived.push_magnitude').then((v) => v.map((x) => Number.isNaN(x) ? x : Math.round(x)));
   assert.equal(size.length, 3500);
   run.appendTicks(1, {});
@@ -202,7 +202,7 @@ test('no ratio and no centre of pressure of a sole without load', async () => {
     'joint_command_t.foot_wrench[1].moment[0]': 0.01, 'joint_command_t.foot_wrench[1].force[0]': 0.1});
   const measured = (fz) => makeRun('7.5', {'robot_sensors_t.foot_wrench[1].force[2]': fz,
     'robot_sensors_t.foot_wrench[1].moment[0]': 0.01, 'support_plan_t.in_contact[1]': 1,
-    'support_plan_t.foot_pose[1].orientation[0]': 1, 'balance_torque_t.frame_o.orientation[0]': 1});
+    'planner_status_t.foot_pose[1].orientation[0]': 1, 'balance_torque_t.frame_o.orientation[0]': 1});
   const least = lightLoad(makeRun(''));
   near(least, 0.0980665 * 10);  // a hundredth of 10 kg
   for (const fz of [0, -6.4e-5, 6.4e-5, -0.99 * least]) {
@@ -222,7 +222,7 @@ test('no ratio and no centre of pressure of a sole without load', async () => {
 
 test('no derived signal is infinite, whatever the messages hold', async () => {
   const constants = {};
-  for (const type of ['robot_sensors_t', 'joint_command_t', 'robot_state_t', 'external_push_t', 'support_plan_t', 'task_torque_t']) {
+  for (const type of ['robot_sensors_t', 'joint_command_t', 'robot_state_t', 'external_push_t', 'support_plan_t', 'planner_status_t', 'task_torque_t']) {
     for (const signal of makeRun('').signals.values()) {
       if (signal.channel.type === type && !signal.integer) constants[`${type}.${signal.field}`] = 3e38;
     }
@@ -362,7 +362,7 @@ test('a live run keeps its last ticks, and what is derived goes on', async () =>
   const ramp = (first, n) => Float32Array.from({length: n}, (_, i) => first + i);
   for (const [first, n] of [[0, 700], [700, 700], [1400, 7], [1407, 2000], [3407, 33]]) {
     run.appendTicks(n, {...Object.fromEntries(['x', 'y', 'z'].map((_, i) => [`EXTERNAL_PUSH.force[${i}]`, new Float32Array(n)])),
-      'EXTERNAL_PUSH.force[0]': ramp(first, n), 'SUPPORT_PLAN.com_position[1]': ramp(first + 5, n)});
+      'EXTERNAL_PUSH.force[0]': ramp(first, n), 'PLANNER_STATUS.com_position[1]': ramp(first + 5, n)});
   }
   assert.deepEqual([run.firstTick, run.numRows], [1940, 1500]);
   near(run.start, 3.88);
@@ -495,7 +495,7 @@ test('what is not measured is no number', async () => {
     'joint_command_t.foot_wrench[0].force[2]': -236, 'joint_command_t.in_contact[1]': 1});
   const first = async (name) => (await valuesOf(run, name))[0];
   for (const name of ['ROBOT_SENSORS.foot_wrench[0].force[2]', 'DRIVE_FEEDBACK.foot_wrench[0].moment[1]', 'derived.right_load_measured',
-    'derived.right_roll_ratio_measured', 'JOINT_COMMAND.margins[0].roll', 'ESTIMATOR_STATUS.covariance[0]', 'SUPPORT_PLAN.step_time']) {
+    'derived.right_roll_ratio_measured', 'JOINT_COMMAND.margins[0].roll', 'ESTIMATOR_STATUS.covariance[0]', 'PLANNER_STATUS.step_time']) {
     if (name.includes('margins') && !run.signals.has(name)) continue;
     assert.ok(Number.isNaN(await first(name)), name);
   }

@@ -64,7 +64,7 @@ const shown = (page) => page.evaluate(async () => {
   });
   const centre = run.robot.feet.map((foot) => [0, 1].map((i) => foot.corners.reduce((sum, c) => sum + c[i], 0) / foot.corners.length));
   return {stood, drawn, centre, prints: scene.steps.footprints.list.map(({foot, from, to, pose}) => ({foot, from, to: to ?? run.end, pose})),
-    steps: Math.max(...(await column('SUPPORT_PLAN.num_steps')).filter(Number.isFinite)), labels: scene.steps.labels.filter((l) => l.object.visible).map((l) => l.shown)};
+    steps: Math.max(...(await column('PLANNER_STATUS.num_steps')).filter(Number.isFinite)), labels: scene.steps.labels.filter((l) => l.object.visible).map((l) => l.shown)};
 });
 
 function compare({stood, drawn, prints, centre}, tolerance) {
@@ -146,7 +146,7 @@ test('the footprints of a step that catches a push are where its soles were, and
   // Steps are known to catch it, from the decision until the foot comes down.
   const caught = await page.evaluate(async () => {
     const {run, player} = window.poise;
-    const stepping = run.signals.get('SUPPORT_PLAN.stepping');
+    const stepping = run.signals.get('PLANNER_STATUS.stepping');
     await stepping.load();
     const [unloads, lands] = [1, 3].map((stage) => run.timeAt(stepping.values.findIndex((x) => x === stage)));
     return [unloads, 0.5 * (unloads + lands), lands - 0.02].map((time) => {
@@ -168,7 +168,7 @@ test('a page that follows a run draws the same', async () => {
   assert.ok(seen.steps >= 1);
   const regions = await page.evaluate(async () => {
     const {run: r, scene, player} = window.poise;
-    player.seek(r.timeAt(r.signals.get('SUPPORT_PLAN.stepping').values.indexOf(2)));
+    player.seek(r.timeAt(r.signals.get('PLANNER_STATUS.stepping').values.indexOf(2)));
     return scene.steps.regions.map((region) => region.object.geometry.drawRange.count);
   });
   assert.ok(regions.every((corners) => corners >= 4), `regions with ${regions} corners`);

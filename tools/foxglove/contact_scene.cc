@@ -45,7 +45,7 @@ std::vector<Vector3d> Placed(const Eigen::Isometry3d& frame,
 
 std::vector<pose_t> SolePoses(const TickMessages& tick) {
   if (tick.truth) return tick.truth->foot_pose;
-  if (tick.plan) return tick.plan->foot_pose;
+  if (tick.planner) return tick.planner->foot_pose;
   return {};
 }
 
@@ -136,24 +136,24 @@ foxglove::SceneUpdate ContactScene::Support(const TickMessages& tick) const {
   foxglove::SceneEntity* const capture = entity("capture point");
   foxglove::SceneEntity* const foothold = entity("foothold");
   foxglove::SceneEntity* const com = entity("centre of mass");
-  if (tick.plan) {
-    const support_plan_t& plan = *tick.plan;
-    AddSphere(GetVector3(plan.capture_point), kMark, kCapture, capture);
-    if (plan.stepping != support_plan_t::STEPPING_NONE && plan.step_foot >= 0 &&
-        static_cast<size_t>(plan.step_foot) < soles_.size()) {
+  if (tick.planner) {
+    const planner_status_t& planner = *tick.planner;
+    AddSphere(GetVector3(planner.capture_point), kMark, kCapture, capture);
+    if (tick.plan && planner.stepping != planner_status_t::STEPPING_NONE &&
+        planner.step_foot >= 0 && static_cast<size_t>(planner.step_foot) < soles_.size()) {
       // The footprint that is aimed at, turned as the foot's reference is.
-      const auto foot = static_cast<size_t>(plan.step_foot);
+      const auto foot = static_cast<size_t>(planner.step_foot);
       Eigen::Isometry3d print = Eigen::Isometry3d::Identity();
       print.linear() = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
-          plan.foot_rotation_reference[foot].rotation);
-      print.translation() = GetVector3(plan.foothold);
+          tick.plan->foot_rotation_reference[foot].rotation);
+      print.translation() = GetVector3(planner.foothold);
       AddLoop(Placed(print, soles_[foot].corners()), kLine, kFoothold, foothold);
     }
   }
   if (tick.truth) {
     AddSphere(GetVector3(tick.truth->com_position), kComSize, kCom, com);
-  } else if (tick.plan) {
-    AddSphere(GetVector3(tick.plan->com_position), kComSize, kCom, com);
+  } else if (tick.planner) {
+    AddSphere(GetVector3(tick.planner->com_position), kComSize, kCom, com);
   }
   return scene;
 }

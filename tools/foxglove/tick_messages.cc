@@ -16,6 +16,7 @@ bool IsPart(std::string_view type) {
   static constexpr std::array kParts = {std::string_view(MessageTraits<robot_sensors_t>::kName),
                                         std::string_view(MessageTraits<robot_state_t>::kName),
                                         std::string_view(MessageTraits<support_plan_t>::kName),
+                                        std::string_view(MessageTraits<planner_status_t>::kName),
                                         std::string_view(MessageTraits<balance_torque_t>::kName),
                                         std::string_view(MessageTraits<joint_command_t>::kName),
                                         std::string_view(MessageTraits<external_push_t>::kName),
@@ -57,9 +58,9 @@ void TickGatherer::Add(std::string_view channel, const MessageType& type,
   if (added) messages.utime = ReadInt64(data.data() + type.run_id_offset + 16);
   const std::string_view name = type.name;
   Decode(name, data, &messages.sensors) || Decode(name, data, &messages.state) ||
-      Decode(name, data, &messages.plan) || Decode(name, data, &messages.balance) ||
-      Decode(name, data, &messages.command) || Decode(name, data, &messages.push) ||
-      Decode(name, data, &messages.truth);
+      Decode(name, data, &messages.plan) || Decode(name, data, &messages.planner) ||
+      Decode(name, data, &messages.balance) || Decode(name, data, &messages.command) ||
+      Decode(name, data, &messages.push) || Decode(name, data, &messages.truth);
 }
 
 std::optional<TickMessages> TickGatherer::Take(bool end) {

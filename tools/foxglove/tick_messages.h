@@ -14,6 +14,7 @@
 #include "poise/external_push_t.hpp"
 #include "poise/ground_truth_t.hpp"
 #include "poise/joint_command_t.hpp"
+#include "poise/planner_status_t.hpp"
 #include "poise/robot_sensors_t.hpp"
 #include "poise/robot_state_t.hpp"
 #include "poise/support_plan_t.hpp"
@@ -25,6 +26,7 @@ struct TickMessages {
   std::optional<robot_sensors_t> sensors;
   std::optional<robot_state_t> state;
   std::optional<support_plan_t> plan;
+  std::optional<planner_status_t> planner;
   std::optional<balance_torque_t> balance;
   std::optional<joint_command_t> command;
   std::optional<external_push_t> push;
@@ -32,7 +34,8 @@ struct TickMessages {
 
   size_t num_parts() const {
     return size_t{0} + sensors.has_value() + state.has_value() + plan.has_value() +
-           balance.has_value() + command.has_value() + push.has_value() + truth.has_value();
+           planner.has_value() + balance.has_value() + command.has_value() + push.has_value() +
+           truth.has_value();
   }
 };
 

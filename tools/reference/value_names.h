@@ -7,9 +7,9 @@
 
 namespace poise {
 
-/// "LOADING" of STEPPING_LOADING, for the field "stepping" of "support_plan_t", whose comment names
-/// STEPPING_*; empty for a number that has no name, and for the fields of nested structs. `path`
-/// may go on with an index.
+/// "LOADING" of STEPPING_LOADING, for the field "stepping" of "planner_status_t", whose comment
+/// names STEPPING_*; empty for a number that has no name, and for the fields of nested structs.
+/// `path` may go on with an index.
 std::string ValueName(std::string_view type, std::string_view path, int64_t value);
 
 }  // namespace poise

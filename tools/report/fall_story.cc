@@ -91,15 +91,16 @@ std::vector<Trouble> All(double fall, const std::vector<Event>& events) {
 /// ", while the right foot was on its way": what the planner's own step did then.
 std::string Meanwhile(const logging::RunRecord& run, double time) {
   const int64_t tick = std::llround(time / run.spec.tick_period()) + run.spec.lead_ticks();
-  const support_plan_t* const plan = run.plan.at(tick);
-  if (plan == nullptr || plan->step_foot < 0 || plan->step_foot >= plan->num_feet) return "";
-  const std::string foot = logging::FootName(run, static_cast<size_t>(plan->step_foot));
-  switch (plan->stepping) {
-    case support_plan_t::STEPPING_UNLOADING:
+  const planner_status_t* const planner = run.planner.at(tick);
+  if (planner == nullptr || planner->step_foot < 0 || planner->step_foot >= planner->num_feet)
+    return "";
+  const std::string foot = logging::FootName(run, static_cast<size_t>(planner->step_foot));
+  switch (planner->stepping) {
+    case planner_status_t::STEPPING_UNLOADING:
       return fmt::format(", while the {} was being unloaded for a step,", foot);
-    case support_plan_t::STEPPING_SWINGING:
+    case planner_status_t::STEPPING_SWINGING:
       return fmt::format(", while the {} was on its way,", foot);
-    case support_plan_t::STEPPING_LOADING:
+    case planner_status_t::STEPPING_LOADING:
       return fmt::format(", while the {} was being loaded after its step,", foot);
     default:
       return "";

@@ -25,7 +25,7 @@ std::optional<double> Figure(const logging::RunRecord& run, const char* metric) 
   return logging::FindMetric(metric)->compute(run);
 }
 
-bool IsOfWalk(const PlannerStep& step) { return step.reason == support_plan_t::REASON_WALK; }
+bool IsOfWalk(const PlannerStep& step) { return step.reason == planner_status_t::REASON_WALK; }
 
 /// The last step of a walk in which the robot falls may not land.
 bool IsWalked(const PlannerStep& step) { return IsOfWalk(step) && step.landing; }

@@ -107,13 +107,13 @@ logging::RunRecord Record(const Prepared& prepared, const std::string& log_dir, 
 }
 
 std::string PhaseAtEnd(const logging::RunRecord& run) {
-  const support_plan_t* plan = run.plan.at(run.num_ticks - 1);
-  if (plan == nullptr) return "";
-  const auto phase = static_cast<size_t>(plan->phase);
+  const planner_status_t* planner = run.planner.at(run.num_ticks - 1);
+  if (planner == nullptr) return "";
+  const auto phase = static_cast<size_t>(planner->phase);
   const std::optional<logging::SchedulePlan> schedule = logging::ReadSchedulePlan(run);
   const bool named =
       schedule && phase < schedule->phases.size() && !schedule->phases[phase].name.empty();
-  return named ? schedule->phases[phase].name : std::to_string(plan->phase);
+  return named ? schedule->phases[phase].name : std::to_string(planner->phase);
 }
 
 void ReadEvents(const logging::RunRecord& run, SweepRow* row) {

@@ -42,7 +42,7 @@ const TOLD = [
     (foot) => foot > 0],
   [/^joint_command_t\.eta(?:_optimal|_min|_max)?$/, ['eta_feasible', 'eta_max'], (told) => told > 0],
   [/^estimator_status_t\.covariance\[\d+\]/, ['has_covariance'], (has) => has > 0],
-  [/^support_plan_t\.step_(?:position\[\d\]|time)/, ['step_needed'], (needed) => needed > 0],
+  [/^planner_status_t\.step_(?:position\[\d\]|time)/, ['step_needed'], (needed) => needed > 0],
   [/^bus_status_t\.((?:temperature|voltage)\[\d+\])/, ['$1'], (reported) => reported !== 0],
 ];
 

@@ -69,18 +69,18 @@ const hasReference = (follows, axis) => axis === 2 || !(follows > 0);
 function comSignals() {
   return AXES.flatMap((axis, i) => [
     {name: `com_motion_${axis}`, unit: 'm', text: 'estimated COM from where it was first',
-      deps: [['support_plan_t', `com_position[${i}]`]], compute: relative},
+      deps: [['planner_status_t', `com_position[${i}]`]], compute: relative},
     {name: `com_motion_true_${axis}`, unit: 'm', text: 'true COM from where it was first',
       deps: [['ground_truth_t', `com_position[${i}]`]], compute: relative},
     {name: `com_motion_desired_${axis}`, unit: 'm', text: 'desired COM from where the estimated one was first',
-      deps: [['support_plan_t', `com_reference.position[${i}]`], ['support_plan_t', `com_position[${i}]`],
+      deps: [['support_plan_t', `com_reference.position[${i}]`], ['planner_status_t', `com_position[${i}]`],
         ['support_plan_t', 'com_follows']],
       compute: ([desired, estimated, follows], k, memory) => {
         const first = firstNumber(memory, estimated[k]);
         return hasReference(follows[k], i) ? desired[k] - first : NaN;
       }},
     {name: `com_error_${axis}`, unit: 'm', text: 'estimated COM less desired',
-      deps: [['support_plan_t', `com_position[${i}]`], ['support_plan_t', `com_reference.position[${i}]`],
+      deps: [['planner_status_t', `com_position[${i}]`], ['support_plan_t', `com_reference.position[${i}]`],
         ['support_plan_t', 'com_follows']],
       compute: pointwise(([a, b, follows]) => hasReference(follows, i) ? a - b : NaN)},
   ]);
@@ -89,7 +89,7 @@ function comSignals() {
 function copSignals(run) {
   const least = lightLoad(run);
   const both = [...wrench('robot_sensors_t', 0), ...wrench('robot_sensors_t', 1),
-    ...pose('support_plan_t', 'foot_pose[0]'), ...pose('support_plan_t', 'foot_pose[1]'),
+    ...pose('planner_status_t', 'foot_pose[0]'), ...pose('planner_status_t', 'foot_pose[1]'),
     ['support_plan_t', 'in_contact[0]'], ['support_plan_t', 'in_contact[1]'], ...pose('balance_torque_t', 'frame_o')];
   return [0, 1].flatMap((i) => [
     {name: `cop_measured_${AXES[i]}`, unit: 'm', text: 'measured centre of pressure, frame O',

@@ -59,7 +59,7 @@ function footWrenches(run, figure) {
 
 function footMotion(figure, run, foot, axis, note) {
   return {figure, title: `Position of the ${run.robot.feet[foot].name} sole, ${'xyz'[axis]}`, unit: 'm', note, series: [
-    series('estimated', 'computed', 'support_plan_t', `foot_pose[${foot}].position[${axis}]`),
+    series('estimated', 'computed', 'planner_status_t', `foot_pose[${foot}].position[${axis}]`),
     series('true', 'truth', 'ground_truth_t', `foot_pose[${foot}].position[${axis}]`),
     series('desired', 'desired', 'support_plan_t', `foot_reference[${foot}].position[${axis}]`)]};
 }

@@ -34,7 +34,7 @@ export class Footprints {
     const {run} = this;
     const truth = run.find('ground_truth_t', 'foot_pose[0].position[0]');
     await this.#samples.load(run, Object.assign({}, ...run.robot.feet.map((_, f) => ({
-      ...pose(`sole${f}`, truth ? 'ground_truth_t' : 'support_plan_t', `foot_pose[${f}]`),
+      ...pose(`sole${f}`, truth ? 'ground_truth_t' : 'planner_status_t', `foot_pose[${f}]`),
       [`contact${f}`]: ['support_plan_t', `in_contact[${f}]`],
       [`load${f}`]: ['robot_state_t', `foot_wrench[${f}].force[2]`],
     }))));

@@ -43,8 +43,8 @@ function rowsOf(run) {
   const plan = find('support_plan_t', 'status');
   const status = find('task_torque_t', 'status');
   const bridge = find('bridge_status_t', 'state');
-  const phase = find('support_plan_t', 'phase');
-  const step = ['stepping', 'step_reason', 'step_foot'].map((field) => find('support_plan_t', field));
+  const phase = find('planner_status_t', 'phase');
+  const step = ['stepping', 'step_reason', 'step_foot'].map((field) => find('planner_status_t', field));
   const feet = run.robot.feet.map((foot) => foot.name);
   return [
     ['phase', [phase], ([i]) => run.scenario.step_planner?.phase?.[i]?.name ?? formatNumber(i)],
@@ -65,7 +65,7 @@ function rowsOf(run) {
 function stepRows(run) {
   if (!run.find(FOOTSTEPS, 'stance')) return [];
   const names = Object.entries(plannedSignals());
-  const capture = ['0', '1'].map((i) => run.find('support_plan_t', `capture_point[${i}]`));
+  const capture = ['0', '1'].map((i) => run.find('planner_status_t', `capture_point[${i}]`));
   const caught = (values) => {
     const byName = new Map(names.map(([name], i) => [name, values[i]]));
     if (Number.isNaN(byName.get('stance'))) return '–';

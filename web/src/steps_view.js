@@ -90,7 +90,7 @@ export class StepsView {
 
   async load() {
     await Promise.all([this.footprints.load(),
-      this.samples.load(this.run, {...plannedSignals(), ...vector('capture', 'support_plan_t', 'capture_point')})]);
+      this.samples.load(this.run, {...plannedSignals(), ...vector('capture', 'planner_status_t', 'capture_point')})]);
   }
 
   /** What is known at a row, whatever comes after it. */

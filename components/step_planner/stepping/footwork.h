@@ -14,7 +14,7 @@
 #include "components/step_planner/stepping/contact_plan.h"
 #include "components/step_planner/stepping/foot_motion.h"
 #include "components/step_planner/stepping/step_choice.h"
-#include "poise/support_plan_t.hpp"
+#include "poise/planner_status_t.hpp"
 
 namespace poise::stepping {
 
@@ -40,13 +40,13 @@ struct StepInput {
 
 /// Why a step was made.
 enum class StepReason : int8_t {
-  kNone = support_plan_t::REASON_NONE,
-  kPersistent = support_plan_t::REASON_PERSISTENT,  ///< the capture point stayed beyond the soles
-  kOutside = support_plan_t::REASON_OUTSIDE,  ///< so far beyond that nothing else can bring it back
-  kLingering = support_plan_t::REASON_LINGERING,  ///< at the edge for long, and coming out
-  kAgain = support_plan_t::REASON_AGAIN,          ///< the step before did not catch it
-  kWalk = support_plan_t::REASON_WALK,            ///< the robot walks
-  kTogether = support_plan_t::REASON_TOGETHER,    ///< the feet are put side by side
+  kNone = planner_status_t::REASON_NONE,
+  kPersistent = planner_status_t::REASON_PERSISTENT,  ///< the capture point stayed beyond the soles
+  kOutside = planner_status_t::REASON_OUTSIDE,      ///< so far that nothing else can bring it back
+  kLingering = planner_status_t::REASON_LINGERING,  ///< at the edge for long, and coming out
+  kAgain = planner_status_t::REASON_AGAIN,          ///< the step before did not catch it
+  kWalk = planner_status_t::REASON_WALK,            ///< the robot walks
+  kTogether = planner_status_t::REASON_TOGETHER,    ///< the feet are put side by side
 };
 
 /// What a planner of steps says of itself.

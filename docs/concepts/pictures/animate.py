@@ -107,7 +107,7 @@ class Scene(Film):
         self.run, self.robot, self.animation = run, run.robot, animation
         self.times = np.linspace(animation.start, animation.end, self.count)
         self.ticks = np.minimum(np.round(self.times / run.info["tick_period"]).astype(int), run.info["num_ticks"] - 1)
-        self.truth, self.support, self.balance = run["GROUND_TRUTH"], run["SUPPORT_PLAN"], run["BALANCE_TORQUE"]
+        self.truth, self.planner, self.balance = run["GROUND_TRUTH"], run["PLANNER_STATUS"], run["BALANCE_TORQUE"]
         self.feet = [Placed(self.truth.foot_pose, self.ticks, foot) for foot in (0, 1)]
         self.legend, self.above = [], "soles from above"
         half_length, half_width = np.array(self.robot.sole_size[0]) / 2
@@ -259,18 +259,18 @@ def capture(scene):
         load = np.maximum(force[:, 2:], 0)
         total, moment = total + load, moment + load * placed.points(place[:, None])[:, 0]
     scene.dot(scene.plan(moment / total), "fb")
-    scene.dot(scene.plan(scene.support.capture_point[scene.ticks]), "fa")
+    scene.dot(scene.plan(scene.planner.capture_point[scene.ticks]), "fa")
     scene.legend += [("capture point", "fa"), ("CoP", "fb")]
 
 
 def stepping(scene):
     """When the planner has a foot on its way."""
-    return scene.spans(scene.support.stepping == 2, "a foot swings", "c")
+    return scene.spans(scene.planner.stepping == 2, "a foot swings", "c")
 
 
 def landing(scene):
     """What the planner makes of the left foot."""
-    state = scene.support.foot_state[:, 1]
+    state = scene.planner.foot_state[:, 1]
     return [span for value, word, style in ((1, "swing", "l"), (2, "searching", "c"), (3, "touching", "b"))
             for span in scene.spans(state == value, word, style)]
 

@@ -50,6 +50,8 @@ TEST(PhaseSchedule, FollowsTheScenarioToTheTick) {
     ASSERT_EQ(state.phase, phase);
     ASSERT_EQ(state.phase_began, tick == 0 || tick == 500 || tick == 1000);
     ASSERT_FALSE(state.waiting());
+    ASSERT_EQ(schedule.next(), phase == 2 ? -1 : phase + 1);
+    ASSERT_NEAR(schedule.TimeLeft(time), phase == 2 ? -1 : phase + 1 - time, 1e-9);
     TransitionKind kind = TransitionKind::kNone;
     double progress = 0;
     if (tick >= 250 && tick < 500) {

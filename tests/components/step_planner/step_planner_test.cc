@@ -72,25 +72,29 @@ TEST_P(StepPlannerCase, HoldsWhereTheRobotWasAtTheFirstTick) {
     message = StateMessage(model_, now);
     harness.Run(TickAt(1));
     const auto& out = harness.output<support_plan_t>();
+    const auto& status = harness.output<planner_status_t>();
     ASSERT_EQ(out.status, support_plan_t::STATUS_OK);
     const robot::RobotData start = robot::Evaluate(model_, first), d = robot::Evaluate(model_, now);
-    EXPECT_LT((GetVector3(out.com_position) - d.com).norm(), 1e-12);
-    EXPECT_LT((GetVector3(out.com_velocity) - d.com_velocity).norm(), 1e-12);
+    EXPECT_LT((GetVector3(status.com_position) - d.com).norm(), 1e-12);
+    EXPECT_LT((GetVector3(status.com_velocity) - d.com_velocity).norm(), 1e-12);
     const PointMotion com = GetMotion(out.com_reference);
     const RotationMotion turn = GetMotion(out.body_reference);
     EXPECT_LT((com.position - start.com).norm(), 1e-12);
     EXPECT_EQ(com.velocity.norm() + com.acceleration.norm(), 0);
     EXPECT_LT((turn.rotation - start.body_rotation[body]).norm(), 1e-12);
     EXPECT_EQ(turn.angular_velocity.norm() + turn.angular_acceleration.norm(), 0);
-    EXPECT_EQ(out.phase, 0);
-    EXPECT_EQ(out.began_by, support_plan_t::OUTCOME_NONE);
-    EXPECT_NEAR(out.phase_time, 0.002, 1e-12);
+    EXPECT_EQ(status.phase, 0);
+    EXPECT_EQ(status.began_by, planner_status_t::OUTCOME_NONE);
+    EXPECT_NEAR(status.phase_time, 0.002, 1e-12);
+    EXPECT_EQ(status.next_phase, -1);
+    EXPECT_EQ(status.phase_left, -1);
+    EXPECT_EQ(status.feet_owner, planner_status_t::OWNER_PHASES);
     for (size_t i = 0; i < 2; ++i) {
       EXPECT_EQ(out.in_contact[i] != 0, GetParam().in_contact[i]);
-      EXPECT_EQ(out.next_in_contact[i], out.in_contact[i]);
-      EXPECT_EQ(out.foot_state[i], GetParam().in_contact[i] ? support_plan_t::FOOT_SUPPORT
-                                                            : support_plan_t::FOOT_SWING);
-      EXPECT_LT((GetPose(out.foot_pose[i]).matrix() - d.foot_pose[i].matrix()).norm(), 1e-12);
+      EXPECT_EQ(status.next_in_contact[i], out.in_contact[i]);
+      EXPECT_EQ(status.foot_state[i], GetParam().in_contact[i] ? planner_status_t::FOOT_SUPPORT
+                                                               : planner_status_t::FOOT_SWING);
+      EXPECT_LT((GetPose(status.foot_pose[i]).matrix() - d.foot_pose[i].matrix()).norm(), 1e-12);
       // A foot in contact goes nowhere.
       const Eigen::Isometry3d& sole = (GetParam().in_contact[i] ? d : start).foot_pose[i];
       EXPECT_LT((GetMotion(out.foot_reference[i]).position - sole.translation()).norm(), 1e-12);
@@ -129,7 +133,7 @@ TEST_P(StepPlannerCase, TheCapturePointIsThePendulums) {
     const robot_state_t message = StateMessage(model_, now);
     harness.Bind("robot_state", &message);
     harness.Run(TickAt(tick));
-    const auto& out = harness.output<support_plan_t>();
+    const auto& out = harness.output<planner_status_t>();
     const robot::RobotData d = robot::Evaluate(model_, now);
     const double ground = d.foot_pose[0].translation().z();
     const double frequency = std::sqrt(robot::kGravity / (d.com.z() - ground));
@@ -157,6 +161,7 @@ TEST_P(StepPlannerCase, SendsTheLastPlanAgainWhenTheStateIsUnusable) {
   harness.Bind("robot_state", &message);
   harness.Run(TickAt(0));
   const support_plan_t good = harness.output<support_plan_t>();
+  const planner_status_t reported = harness.output<planner_status_t>();
   const robot_state_t sound = message;
   message.base_position[2] = std::numeric_limits<double>::infinity();
   harness.Run(TickAt(1));
@@ -164,6 +169,9 @@ TEST_P(StepPlannerCase, SendsTheLastPlanAgainWhenTheStateIsUnusable) {
   EXPECT_EQ(out.status, support_plan_t::STATUS_INVALID_STATE);
   EXPECT_EQ(GetVector3(out.com_reference.position), GetVector3(good.com_reference.position));
   EXPECT_TRUE(MessageTraits<support_plan_t>::AllFinite(out));
+  const auto& status = harness.output<planner_status_t>();
+  EXPECT_EQ(GetVector3(status.com_position), GetVector3(reported.com_position));
+  EXPECT_TRUE(MessageTraits<planner_status_t>::AllFinite(status));
   message = sound;
   harness.Run(TickAt(2));
   EXPECT_EQ(out.status, support_plan_t::STATUS_OK);
@@ -216,7 +224,7 @@ TEST(StepPlanner, ReportsAWaitingUnloading) {
     harness.Run(TickAt(tick));
     const auto& out = harness.output<support_plan_t>();
     ASSERT_EQ(out.status, support_plan_t::STATUS_WAITING);
-    ASSERT_EQ(out.phase, 0);
+    ASSERT_EQ(harness.output<planner_status_t>().phase, 0);
     ASSERT_EQ(out.transition, support_plan_t::TRANSITION_NONE);
     ASSERT_EQ(out.in_contact[1], 1);
   }
@@ -261,11 +269,12 @@ class TouchDown : public testing::Test {
     harness_.Bind("robot_state", &message_);
   }
   /// `load` on the left sole, N, until `time`, s.
-  const support_plan_t& Run(double time, double load) {
+  const planner_status_t& Run(double time, double load) {
     message_.foot_wrench[1].force[2] = -load;
     while (TickAt(tick_).time < time - 1e-9) harness_.Run(TickAt(tick_++));
-    return harness_.output<support_plan_t>();
+    return harness_.output<planner_status_t>();
   }
+  const support_plan_t& plan() const { return harness_.output<support_plan_t>(); }
 
   ControlContext context_{TestRobot::kDyros};
   Harness<StepPlanner> harness_;
@@ -274,52 +283,57 @@ class TouchDown : public testing::Test {
 };
 
 TEST_F(TouchDown, InTimeDoesNotShiftTheSchedule) {
-  EXPECT_EQ(Run(0.07, 0).foot_state[1], support_plan_t::FOOT_SWING);
-  EXPECT_EQ(Run(0.4, 12).foot_state[1], support_plan_t::FOOT_TOUCHING);
-  EXPECT_EQ(harness_.output<support_plan_t>().in_contact[1], 0);
-  const support_plan_t& out = Run(0.402, 12);
-  EXPECT_EQ(out.status, support_plan_t::STATUS_OK);
+  EXPECT_EQ(Run(0.07, 0).foot_state[1], planner_status_t::FOOT_SWING);
+  EXPECT_EQ(Run(0.4, 12).foot_state[1], planner_status_t::FOOT_TOUCHING);
+  EXPECT_EQ(plan().in_contact[1], 0);
+  const planner_status_t& out = Run(0.402, 12);
+  EXPECT_EQ(plan().status, support_plan_t::STATUS_OK);
   EXPECT_EQ(out.phase, 2);
-  EXPECT_EQ(out.in_contact[1], 1);
-  EXPECT_EQ(out.foot_state[1], support_plan_t::FOOT_SUPPORT);
-  EXPECT_EQ(out.transition, support_plan_t::TRANSITION_LOADING);
-  EXPECT_NEAR(out.transition_progress, 0, 1e-8);
+  EXPECT_EQ(plan().in_contact[1], 1);
+  EXPECT_EQ(out.foot_state[1], planner_status_t::FOOT_SUPPORT);
+  EXPECT_EQ(plan().transition, support_plan_t::TRANSITION_LOADING);
+  EXPECT_NEAR(plan().transition_progress, 0, 1e-8);
 }
 
 TEST_F(TouchDown, LateHoldsTheScheduleUntilTheLoadHasLasted) {
-  EXPECT_EQ(Run(0.2, 0).foot_state[1], support_plan_t::FOOT_SWING);
-  EXPECT_EQ(Run(0.21, 0).foot_state[1], support_plan_t::FOOT_SEARCHING);
-  EXPECT_EQ(Run(0.4, 0).status, support_plan_t::STATUS_OK);
-  const support_plan_t& out = Run(0.5, 0);
-  EXPECT_EQ(out.status, support_plan_t::STATUS_WAITING);
-  EXPECT_EQ(out.waiting_for, support_plan_t::WAITING_CONTACT);
+  EXPECT_EQ(Run(0.2, 0).foot_state[1], planner_status_t::FOOT_SWING);
+  EXPECT_EQ(Run(0.21, 0).foot_state[1], planner_status_t::FOOT_SEARCHING);
+  const planner_status_t& out = Run(0.4, 0);
+  EXPECT_EQ(plan().status, support_plan_t::STATUS_OK);
+  EXPECT_EQ(out.next_phase, 2);
+  EXPECT_NEAR(out.phase_left, 0.4 - TickAt(tick_ - 1).time, 1e-9);
+  Run(0.5, 0);
+  EXPECT_EQ(out.phase_left, 0);
+  EXPECT_EQ(plan().status, support_plan_t::STATUS_WAITING);
+  EXPECT_EQ(out.waiting_for, planner_status_t::WAITING_CONTACT);
   EXPECT_EQ(out.phase, 1);
-  EXPECT_LT(out.foot_reference[1].position[2], out.foot_pose[1].position[2] - 0.02);
+  EXPECT_LT(plan().foot_reference[1].position[2], out.foot_pose[1].position[2] - 0.02);
   // 0.02 s of load, then 0.3 s in which it settles.
-  EXPECT_EQ(Run(0.52, 12).foot_state[1], support_plan_t::FOOT_SEARCHING);
-  EXPECT_EQ(Run(0.522, 12).foot_state[1], support_plan_t::FOOT_TOUCHING);
-  EXPECT_EQ(Run(0.82, 12).waiting_for, support_plan_t::WAITING_CONTACT);
+  EXPECT_EQ(Run(0.52, 12).foot_state[1], planner_status_t::FOOT_SEARCHING);
+  EXPECT_EQ(Run(0.522, 12).foot_state[1], planner_status_t::FOOT_TOUCHING);
+  EXPECT_EQ(Run(0.82, 12).waiting_for, planner_status_t::WAITING_CONTACT);
   EXPECT_EQ(Run(0.824, 12).phase, 2);
-  EXPECT_EQ(out.status, support_plan_t::STATUS_OK);
-  EXPECT_EQ(out.waiting_for, support_plan_t::WAITING_NONE);
+  EXPECT_EQ(plan().status, support_plan_t::STATUS_OK);
+  EXPECT_EQ(out.waiting_for, planner_status_t::WAITING_NONE);
 }
 
 // This foot does not move: its reference gives up at twice the depth.
 TEST_F(TouchDown, WithoutASurfaceItEndsInSingleSupport) {
-  const support_plan_t& out = Run(8, 0);
-  EXPECT_EQ(out.status, support_plan_t::STATUS_WAITING);
-  EXPECT_EQ(out.waiting_for, support_plan_t::WAITING_NO_SURFACE);
-  EXPECT_EQ(out.foot_state[1], support_plan_t::FOOT_RETRACTED);
+  const planner_status_t& out = Run(8, 0);
+  EXPECT_EQ(plan().status, support_plan_t::STATUS_WAITING);
+  EXPECT_EQ(out.waiting_for, planner_status_t::WAITING_NO_SURFACE);
+  EXPECT_EQ(out.foot_state[1], planner_status_t::FOOT_RETRACTED);
   EXPECT_EQ(out.phase, 1);
-  EXPECT_NEAR(out.foot_reference[1].position[2], -0.02 - 0.12 + 0.05, 1e-3);
+  EXPECT_NEAR(plan().foot_reference[1].position[2], -0.02 - 0.12 + 0.05, 1e-3);
   EXPECT_EQ(Run(9, 100).phase, 1);  // for good
 }
 
 TEST_F(TouchDown, ALoadThatIsNoNumberIsAnInvalidState) {
   Run(0.1, 0);
-  EXPECT_EQ(Run(0.11, std::numeric_limits<double>::quiet_NaN()).status,
-            support_plan_t::STATUS_INVALID_STATE);
-  EXPECT_EQ(Run(0.12, 0).status, support_plan_t::STATUS_OK);
+  Run(0.11, std::numeric_limits<double>::quiet_NaN());
+  EXPECT_EQ(plan().status, support_plan_t::STATUS_INVALID_STATE);
+  Run(0.12, 0);
+  EXPECT_EQ(plan().status, support_plan_t::STATUS_OK);
 }
 
 constexpr double kSlip = 0.008;  // m: so little that the COM's reference does not wait
@@ -341,9 +355,8 @@ PointMotion ComAfterSlip(const std::string& config, int64_t slip) {
     message.foot_wrench[0].force[2] = message.foot_wrench[1].force[2] = -250;
     harness.Run(TickAt(tick));
   }
-  const auto& plan = harness.output<support_plan_t>();
-  EXPECT_EQ(plan.phase, 1);
-  PointMotion com = GetMotion(plan.com_reference);
+  EXPECT_EQ(harness.output<planner_status_t>().phase, 1);
+  PointMotion com = GetMotion(harness.output<support_plan_t>().com_reference);
   com.position -= start;
   return com;
 }
@@ -389,6 +402,7 @@ TEST(StepPlanner, ARecoveryThatTakesAWalkOverKeepsItsHeading) {
   robot_state_t message{};
   harness.Bind("robot_state", &message);
   const auto& plan = harness.output<support_plan_t>();
+  const auto& status = harness.output<planner_status_t>();
   const auto reference = [&] { return GetMotion(plan.body_reference).rotation; };
   // All of it has turned since the walk began, as its steps would have turned it.
   constexpr double kTurn = 0.3;  // rad
@@ -417,8 +431,13 @@ TEST(StepPlanner, ARecoveryThatTakesAWalkOverKeepsItsHeading) {
       const double step = Eigen::AngleAxisd(reference() * last.transpose()).angle();
       largest_turn = std::max(largest_turn, step);
     }
-    const bool steps = plan.stepping != support_plan_t::STEPPING_NONE;
-    if (steps && plan.step_reason != support_plan_t::REASON_WALK) ++recovering;
+    const bool steps = status.stepping != planner_status_t::STEPPING_NONE;
+    ASSERT_EQ(plan.com_follows == support_plan_t::FOLLOWS_COP, steps);
+    const bool recovers = steps && status.step_reason != planner_status_t::REASON_WALK;
+    ASSERT_EQ(status.feet_owner, recovers ? planner_status_t::OWNER_RECOVERY
+                                 : steps  ? planner_status_t::OWNER_WALK
+                                          : planner_status_t::OWNER_PHASES);
+    if (recovers) ++recovering;
     ++tick;
   }
   EXPECT_EQ(recovering, 100);
@@ -441,10 +460,11 @@ class WayOut : public testing::Test {
     message_.foot_wrench[1].force[2] = -load;
     do {
       harness_.Run(TickAt(tick_++));
-    } while (plan().phase != phase && TickAt(tick_).time < 20);
+    } while (status().phase != phase && TickAt(tick_).time < 20);
     return TickAt(tick_ - 1).time;
   }
   const support_plan_t& plan() const { return harness_.output<support_plan_t>(); }
+  const planner_status_t& status() const { return harness_.output<planner_status_t>(); }
   double foot_height() const { return plan().foot_reference[1].position[2]; }
 
   ControlContext context_{TestRobot::kDyros};
@@ -464,16 +484,16 @@ class WayOut : public testing::Test {
 
 TEST_F(WayOut, AFootWithoutASurfaceComesUpAndThePlanGoesOnFromThere) {
   EXPECT_NEAR(RunUntil(1, 0), 0.1, 1e-9);
-  EXPECT_EQ(plan().next_in_contact[1], 1);
+  EXPECT_EQ(status().next_in_contact[1], 1);
   double lowest = 0, last = foot_height();
   int retracted = 0, waiting = 0;
-  while (plan().phase == 1) {
+  while (status().phase == 1) {
     harness_.Run(TickAt(tick_++));
     lowest = std::min(lowest, foot_height());
     EXPECT_LT(std::abs(foot_height() - last), 1e-3);  // no step
     last = foot_height();
-    retracted += plan().foot_state[1] == support_plan_t::FOOT_RETRACTED;
-    waiting += plan().waiting_for == support_plan_t::WAITING_NO_SURFACE;
+    retracted += status().foot_state[1] == planner_status_t::FOOT_RETRACTED;
+    waiting += status().waiting_for == planner_status_t::WAITING_NO_SURFACE;
   }
   // This foot does not follow: its reference gives up at twice the depth, is brought to a stand
   // within millimetres, and rises by 0.05 m from there.
@@ -481,19 +501,19 @@ TEST_F(WayOut, AFootWithoutASurfaceComesUpAndThePlanGoesOnFromThere) {
   EXPECT_NEAR(foot_height(), -0.02 - 0.12 + 0.05, 1e-3);
   EXPECT_NEAR(retracted * 0.002, 0.05 / 0.03, 0.01);
   EXPECT_GT(waiting, 0);
-  EXPECT_EQ(plan().phase, 3);
-  EXPECT_EQ(plan().began_by, support_plan_t::OUTCOME_NO_SURFACE);
-  EXPECT_EQ(plan().waiting_for, support_plan_t::WAITING_NONE);
-  EXPECT_EQ(plan().foot_state[1], support_plan_t::FOOT_SWING);
+  EXPECT_EQ(status().phase, 3);
+  EXPECT_EQ(status().began_by, planner_status_t::OUTCOME_NO_SURFACE);
+  EXPECT_EQ(status().waiting_for, planner_status_t::WAITING_NONE);
+  EXPECT_EQ(status().foot_state[1], planner_status_t::FOOT_SWING);
   EXPECT_EQ(plan().in_contact[1], 0);
   // "higher", from where the foot is held, then down again, and there a load.
   const double begun = TickAt(tick_ - 1).time, held = foot_height();
   EXPECT_NEAR(RunUntil(1, 0), begun + 1, 1e-9);
   EXPECT_NEAR(foot_height(), held + 0.03, 1e-6);
-  EXPECT_EQ(plan().began_by, support_plan_t::OUTCOME_DONE);
+  EXPECT_EQ(status().began_by, planner_status_t::OUTCOME_DONE);
   RunUntil(2, 50);
   EXPECT_EQ(plan().in_contact[1], 1);
-  EXPECT_EQ(plan().foot_state[1], support_plan_t::FOOT_SUPPORT);
+  EXPECT_EQ(status().foot_state[1], planner_status_t::FOOT_SUPPORT);
 }
 
 TEST_F(WayOut, ALostContactIsGivenUp) {
@@ -502,14 +522,14 @@ TEST_F(WayOut, ALostContactIsGivenUp) {
   EXPECT_LT(stood, 1);
   message_.foot_wrench[1].force[2] = -300;
   for (int i = 0; i < 100; ++i) harness_.Run(TickAt(tick_++));
-  EXPECT_EQ(plan().phase, 2);
+  EXPECT_EQ(status().phase, 2);
   const double lost = TickAt(tick_).time;
   EXPECT_NEAR(RunUntil(4, 0), lost + 0.1, 1e-9);
-  EXPECT_EQ(plan().began_by, support_plan_t::OUTCOME_CONTACT_LOST);
+  EXPECT_EQ(status().began_by, planner_status_t::OUTCOME_CONTACT_LOST);
   EXPECT_EQ(plan().in_contact[0], 1);
   EXPECT_EQ(plan().in_contact[1], 0);
   // It hangs where it was when it was given up.
-  const Eigen::Vector3d sole = GetVector3(plan().foot_pose[1].position);
+  const Eigen::Vector3d sole = GetVector3(status().foot_pose[1].position);
   EXPECT_LT((GetVector3(plan().foot_reference[1].position) - sole).norm(), 1e-12);
 }
 

@@ -44,13 +44,13 @@ function motionSignals(run) {
     ...vector('crane', 'ground_truth_t', 'crane_point'), ...vector('crane_force', 'ground_truth_t', 'crane_force'),
     crane_share: ['ground_truth_t', 'crane_share'],
     ...(type === 'ground_truth_t' ? vector('com', type, 'com_position')
-      : vector('com', 'support_plan_t', 'com_position'))};
+      : vector('com', 'planner_status_t', 'com_position'))};
 }
 
 function contactSignals(run) {
   const truth = run.find('ground_truth_t', 'foot_pose[0].position[0]');
   return Object.assign({}, ...run.robot.feet.map((_, f) => ({
-    ...pose(`sole${f}`, truth ? 'ground_truth_t' : 'support_plan_t', `foot_pose[${f}]`),
+    ...pose(`sole${f}`, truth ? 'ground_truth_t' : 'planner_status_t', `foot_pose[${f}]`),
     ...vector(`measured${f}.force`, 'robot_sensors_t', `foot_wrench[${f}].force`),
     ...vector(`measured${f}.moment`, 'robot_sensors_t', `foot_wrench[${f}].moment`),
     ...vector(`computed${f}.force`, 'joint_command_t', `foot_wrench[${f}].force`),
@@ -59,12 +59,12 @@ function contactSignals(run) {
   })), pose('frame', 'balance_torque_t', 'frame_o'), vector('cop', 'balance_torque_t', 'cop', 2),
   vector('corner_x', 'balance_torque_t', 'corner_x', REGION_CORNERS),
   vector('corner_y', 'balance_torque_t', 'corner_y', REGION_CORNERS),
-  vector('capture', 'support_plan_t', 'capture_point'), vector('step', 'support_plan_t', 'step_position'),
+  vector('capture', 'planner_status_t', 'capture_point'), vector('step', 'planner_status_t', 'step_position'),
   vector('push', 'external_push_t', 'force'),
   vector('point', 'external_push_t', 'point'), {
     'measured_cop[0]': ['derived', 'cop_measured_x'], 'measured_cop[1]': ['derived', 'cop_measured_y'],
     'desired_cop[0]': ['derived', 'cop_desired_x'], 'desired_cop[1]': ['derived', 'cop_desired_y'],
-    num_corners: ['balance_torque_t', 'num_corners'], step_needed: ['support_plan_t', 'step_needed'],
+    num_corners: ['balance_torque_t', 'num_corners'], step_needed: ['planner_status_t', 'step_needed'],
     active_x: ['balance_torque_t', 'active_x'], active_y: ['balance_torque_t', 'active_y']});
 }
 
