@@ -42,7 +42,7 @@ QuasiStaticWalk::QuasiStaticWalk(const StepChoice& choice, const QuasiStaticSpec
       height_(spec.height_rate),
       heading_(spec.yaw_rate),
       pressed_(spec.height_rate),
-      sole_{PressedSole(choice.foot(Foot::kRight)), PressedSole(choice.foot(Foot::kLeft))},
+      sole_{SoleMemory(choice.foot(Foot::kRight)), SoleMemory(choice.foot(Foot::kLeft))},
       ramp_start_(RampStart(kPressShare)) {}
 
 double RampStart(double share) {
@@ -94,7 +94,9 @@ bool QuasiStaticWalk::LiftsOff(const StepState& state, double time) const {
   return off.norm() < spec_.lift_off_distance;
 }
 
-bool QuasiStaticWalk::OnSoftGround() const { return std::max(sinks_[0], sinks_[1]) > spec_.soft; }
+bool QuasiStaticWalk::OnSoftGround() const {
+  return std::max(sole_[0].sinks(), sole_[1].sinks()) > spec_.soft;
+}
 
 bool QuasiStaticWalk::AtRest(const StepInput& input, const StepState& state) {
   const Vector2d middle = 0.5 * (state.sole[0] + state.sole[1]);
@@ -157,7 +159,6 @@ void QuasiStaticWalk::Start(const StepInput& input, const StepState& state,
   starting_ = true;
   stance_ = Other(FirstFoot(command));
   in_contact_ = {true, true};
-  sinks_ = {0, 0};
   for (const Foot foot : kFeet) sole_[foot].Touch(input.sole[foot]);
   slower_ = 1;
   double ground = input.sole[0].translation().z();
@@ -172,12 +173,7 @@ void QuasiStaticWalk::Start(const StepInput& input, const StepState& state,
   offset_.setZero();
   reckoned_ = state.pendulum.capture_point();
   Enter(Stage::kShifting, input.time);
-  // From rest to rest above the stance sole.
-  const Vector2d now = state.pendulum.capture_point(), above = state.sole[stance_];
-  for (int i = 0; i < 2; ++i) {
-    start_[static_cast<size_t>(i)].Begin({now[i]}, {above[i], 0, 0}, input.time,
-                                         spec_.start + spec_.unload);
-  }
+  start_ = {state.pendulum.capture_point(), input.time, spec_.start + spec_.unload};
 }
 
 void QuasiStaticWalk::BeginSwing(const StepInput& input) {
@@ -223,11 +219,9 @@ void QuasiStaticWalk::Land(const StepInput& input, const StepState& state,
   ++num_steps_;
   in_contact_ = {true, true};
   const Foot foot = Other(stance_);
-  sinks_[foot] =
-      std::min(ExpectedSinking(sole_[foot].Sunk(input.sole[foot]), input.load[foot], spec_.weight),
-               spec_.most_sinking);
+  sole_[foot].Expect(input.sole[foot], input.load[foot], spec_.weight, spec_.most_sinking);
   const double haste = kSinkSpeed * (spec_.load + spec_.unload);
-  slower_ = sinks_[foot] > haste ? sinks_[foot] / haste : 1;
+  slower_ = std::max(sole_[foot].sinks() / haste, 1.0);
   course_ = Next(course_, foot);
   stance_ = foot;
   steps_.Land(input.time, input.time + slower_ * spec_.load);
@@ -302,39 +296,30 @@ balance::ConvexPolygon QuasiStaticWalk::Carrying(const StepInput& input, const S
   return balance::ConvexHull({mixed.data(), corners});
 }
 
-Vector2d QuasiStaticWalk::WantedCop(const StepState& state, double time) {
+CaptureReference QuasiStaticWalk::Wanted(const StepState& state, double time) const {
   const Vector2d& stance = state.sole[stance_];
   const Vector2d& other = state.sole[Other(stance_)];
-  const double w = state.pendulum.frequency;
-  if (starting_) {
-    Vector2d cop;
-    for (int i = 0; i < 2; ++i) {
-      const Quintic::Point point = start_[static_cast<size_t>(i)].At(time);
-      wanted_[i] = point.position;
-      cop[i] = point.position - point.velocity / w;
-    }
-    return cop;
-  }
+  if (starting_) return start_.At(time, stance);
   const double pressed = pressed_.point().position, pressing = pressed_.point().velocity;
   if (OnOneFoot()) {
-    wanted_ = stance + pressed * (other - stance);
-    return wanted_ - pressing / w * (other - stance);
+    const Vector2d way = other - stance;
+    return {stance + pressed * way, pressing * way};
   }
   const Vector2d way = (steps_.empty() ? Vector2d(0.5 * (stance + other)) : stance) - other;
-  // Minimum jerk, p = ξ − ξ̇/ω: towards the outer edge at first, never beyond the next middle.
+  // Minimum jerk: the centre of pressure goes towards the outer edge at first, never beyond the
+  // next middle.
   const balance::MinimumJerk gone(time - steps_.landed().touch_down, Transfer());
   const double share = pressed + (1 - pressed) * gone.position;
   const double rate = pressing * (1 - gone.position) + (1 - pressed) * gone.speed;
-  wanted_ = other + share * way;
-  return wanted_ - rate / w * way;
+  return {other + share * way, rate * way};
 }
 
 Vector2d QuasiStaticWalk::DesiredCop(const StepInput& input, const StepState& state) {
   const double time = input.time;
-  const Vector2d cop = WantedCop(state, time);
-  const Vector2d error = state.pendulum.capture_point() - wanted_;
-  const balance::ConvexPolygon carrying = Carrying(input, state, cop);
-  const Vector2d asked = balance::NearestPoint(carrying, cop + (1 + kGain) * error);
+  wanted_ = Wanted(state, time);
+  const balance::ConvexPolygon carrying =
+      Carrying(input, state, wanted_.Cop(state.pendulum.frequency));
+  const Vector2d asked = LeadingCop(state.pendulum, wanted_, kGain, carrying);
   // A foot that lands at another time than planned makes no step of it.
   if (since_ == time && stage_ != Stage::kShifting) left_over_ = output_.cop - asked;
   const double left = 1 - balance::SmoothStep((time - since_) / kBlend);
@@ -342,7 +327,7 @@ Vector2d QuasiStaticWalk::DesiredCop(const StepInput& input, const StepState& st
 }
 
 double QuasiStaticWalk::SwingTime() const {
-  const double sinks = sinks_[stance_];
+  const double sinks = sole_[stance_].sinks();
   if (!(sinks > spec_.soft)) return spec_.swing;
   return spec_.swing * std::min(std::sqrt(sinks / spec_.soft), kSlowestSwing);
 }
@@ -369,13 +354,9 @@ Vector2d QuasiStaticWalk::WithoutOffset(const StepState& state, const Vector2d& 
 
 double QuasiStaticWalk::StillSinks(const StepInput& input) {
   const Foot s = stance_;
-  // A sole that stands on one corner sinks farther than one that lies, under the same load: each
-  // tick's is an upper bound.
-  const double sunk = sole_[s].Sunk(input.sole[s]), load = input.load[s];
-  if (load > spec_.landing.press_load) {
-    sinks_[s] = std::min(sinks_[s], std::max(sunk, ExpectedSinking(sunk, load, spec_.weight)));
-  }
-  const double left = sinks_[s] * std::clamp(1 - load / spec_.weight, 0.0, 1.0);
+  const double load = input.load[s];
+  if (load > spec_.landing.press_load) sole_[s].Correct(input.sole[s], load, spec_.weight);
+  const double left = sole_[s].sinks() * std::clamp(1 - load / spec_.weight, 0.0, 1.0);
   return std::min(left, spec_.most_ahead);
 }
 
@@ -389,7 +370,7 @@ double QuasiStaticWalk::Height(const StepInput& input, const StepState& state) {
   // Above the lower foot: a straight leg reaches no farther down.
   const double height = (feels ? std::min(low, other) : low) + standing_height_ - lower;
   const bool shifts = stage_ == Stage::kLoading || stage_ == Stage::kUnloading;
-  if (!shifts || !(sinks_[s] > spec_.soft)) return height;
+  if (!shifts || !(sole_[s].sinks() > spec_.soft)) return height;
   // While a foot sinks, above the higher one as far as the lower one's leg reaches: the ankle of a
   // leg that is bent above its sole comes to its limit first.
   double highest = std::max(stance, other) + standing_height_ - lower;
@@ -426,9 +407,9 @@ void QuasiStaticWalk::Lead(const StepInput& input, const StepState& state) {
 
 void QuasiStaticWalk::Archive(StateArchive* archive) {
   archive->Show(stage_, command_, stance_, num_steps_, in_contact_, steps_, foot_, height_,
-                heading_, pressed_, sole_, sinks_, slower_, time_, since_, moving_since_,
-                standing_height_, starting_, course_, unloaded_, lowered_, start_, wanted_,
-                left_over_, reckoned_, offset_, output_);
+                heading_, pressed_, sole_, slower_, time_, since_, moving_since_, standing_height_,
+                starting_, course_, unloaded_, lowered_, start_, wanted_, left_over_, reckoned_,
+                offset_, output_);
 }
 
 }  // namespace poise::stepping

@@ -9,7 +9,7 @@
 #include "components/step_planner/stepping/footsteps.h"
 #include "components/step_planner/stepping/footwork.h"
 #include "components/step_planner/stepping/known_ground.h"
-#include "components/step_planner/stepping/pressed_sole.h"
+#include "components/step_planner/stepping/sole_memory.h"
 #include "components/step_planner/stepping/step_choice.h"
 
 namespace poise::stepping {
@@ -92,7 +92,7 @@ class QuasiStaticWalk {
   /// rad, rad/s, rad/s² about the vertical, of the body since it stood.
   const Quintic::Point& body_yaw() const { return heading_.turned(); }
   /// m, world: where the capture point shall be, before its error is fed back.
-  const Eigen::Vector2d& wanted() const { return wanted_; }
+  const Eigen::Vector2d& wanted() const { return wanted_.point; }
   void Archive(StateArchive* archive);
 
  private:
@@ -137,8 +137,8 @@ class QuasiStaticWalk {
   /// for a centre of pressure that is wanted at `cop`.
   balance::ConvexPolygon Carrying(const StepInput& input, const StepState& state,
                                   const Eigen::Vector2d& cop) const;
-  /// From above one sole to above the other while both carry; sets `wanted_` too.
-  Eigen::Vector2d WantedCop(const StepState& state, double time);
+  /// From above one sole to above the other while both carry.
+  CaptureReference Wanted(const StepState& state, double time) const;
   Eigen::Vector2d DesiredCop(const StepInput& input, const StepState& state);
   /// A sole has sunk. The control of a phase that stands would stir it: the walk goes on without
   /// steps.
@@ -166,17 +166,16 @@ class QuasiStaticWalk {
   BodyHeading heading_;
   HeightLead pressed_;                              // share that the press carries
   double time_ = 0, since_ = 0, moving_since_ = 0;  // s: last tick; stage; not at rest
-  FootArray<PressedSole> sole_;
-  FootArray<double> sinks_{0, 0};  // m, expected of each sole under the weight
-  double slower_ = 1;              // ratio: the ramps, where the sole sinks
-  double unloaded_ = 0;            // of the unloading ramp
-  double ramp_start_ = 0;          // of the loading ramp: what the press carries
-  double standing_height_ = 0;     // m
-  bool lowered_ = false;           // stopped while it walked: it has not stood up since
-  bool starting_ = false;          // no foot has left the ground yet
-  Foothold course_;  // where the stance sole would stand if every step came down as commanded
-  std::array<Quintic, 2> start_;                         // of the capture point while starting
-  Eigen::Vector2d wanted_ = Eigen::Vector2d::Zero();     // m
+  FootArray<SoleMemory> sole_;
+  double slower_ = 1;           // ratio: the ramps, where the sole sinks
+  double unloaded_ = 0;         // of the unloading ramp
+  double ramp_start_ = 0;       // of the loading ramp: what the press carries
+  double standing_height_ = 0;  // m
+  bool lowered_ = false;        // stopped while it walked: it has not stood up since
+  bool starting_ = false;       // no foot has left the ground yet
+  Foothold course_;    // where the stance sole would stand if every step came down as commanded
+  CaptureMove start_;  // of the capture point while starting
+  CaptureReference wanted_;
   Eigen::Vector2d reckoned_ = Eigen::Vector2d::Zero();   // m, capture point by the pendulum
   Eigen::Vector2d offset_ = Eigen::Vector2d::Zero();     // m, of the centre of pressure it obeys
   Eigen::Vector2d left_over_ = Eigen::Vector2d::Zero();  // m, of the last stage's at its end

@@ -199,8 +199,9 @@ void Recovery::BeginShift(const StepInput& input, const StepState& state) {
   height_.Begin(input.com_height);
   steps_now_ = 0;
   in_contact_ = input.in_contact;
-  shift_from_ = state.pendulum.capture_point();
-  cop_from_ = output_.cop = shift_from_;
+  const bool walks = reason_ == StepReason::kWalk;
+  shift_ = {state.pendulum.capture_point(), input.time, walks ? kSetOff : kTogetherShift};
+  cop_from_ = output_.cop = shift_.from;
   since_ = input.time;
   stage_ = Stage::kShifting;
 }
@@ -355,48 +356,44 @@ Vector2d Recovery::ForBody(const StepInput& input, double budget) const {
 }
 
 Vector2d Recovery::PointFor(const StepInput& input, const StepState& state,
-                            const balance::ConvexPolygon& support, const Vector2d& goal,
-                            const Vector2d& velocity, double budget) const {
-  const Vector2d point = state.pendulum.capture_point();
-  const Vector2d body = ForBody(input, budget);
-  const Vector2d lead = velocity / state.pendulum.frequency;
+                            const balance::ConvexPolygon& support,
+                            const CaptureReference& reference, double budget) const {
   const bool gently = stage_ == Stage::kShifting || reason_ == StepReason::kTogether;
   const double gain = gently ? std::max(kGain, kTogetherGain) : kGain;
-  return balance::NearestPoint(support, point - lead + gain * (point - goal) + body) - body;
+  return LeadingCop(state.pendulum, reference, gain, support, ForBody(input, budget));
 }
 
 Vector2d Recovery::BrakingPoint(const StepInput& input, const StepState& state) const {
   const Foot stance = Other(plan_.foot);
   const balance::ConvexPolygon sole = choice_.Sole(state, stance);
   if (reason_ == StepReason::kTogether) {
-    return PointFor(input, state, sole, state.sole[stance], Vector2d::Zero(), kSwingBudget);
+    return PointFor(input, state, sole, {state.sole[stance], Vector2d::Zero()}, kSwingBudget);
   }
   if (reason_ == StepReason::kWalk) {
-    return WalkingPoint(input, state, stance, sole,
-                        steps_.first().touch_down + gait(state).transfer - input.time);
+    const double left = steps_.first().touch_down + gait(state).transfer - input.time;
+    return PointFor(input, state, sole, choice_.StrideReference(state, stance, gait(state), left),
+                    kSwingBudget);
   }
-  const Vector2d body = ForBody(input, kSwingBudget);
-  return balance::NearestPoint(sole, state.pendulum.capture_point() + body) - body;
+  // It only brakes: what is left of the way is the foot's.
+  return LeadingCop(state.pendulum, {state.pendulum.capture_point(), Vector2d::Zero()}, 0, sole,
+                    ForBody(input, kSwingBudget));
 }
 
 Vector2d Recovery::CatchingPoint(const StepInput& input, const StepState& state) const {
-  Vector2d goal = Goal(state), velocity = Vector2d::Zero();
+  const balance::ConvexPolygon soles = choice_.Soles(state);
   const bool walks = command_.stepping && reason_ == StepReason::kWalk;
-  if (walks && stage_ != Stage::kShifting) {
-    return WalkingPoint(input, state, plan_.foot, choice_.Soles(state), gait(state).period);
+  if (stage_ == Stage::kShifting) {
+    const Foot stance = Other(plan_.foot);
+    const Vector2d to =
+        walks ? choice_.StrideBegin(state, stance, gait(state)) : state.sole[stance];
+    return PointFor(input, state, soles, shift_.At(input.time, to), kCatchBudget);
   }
-  if (stage_ == Stage::kShifting && walks) {
-    const Vector2d way = choice_.StrideBegin(state, Other(plan_.foot), gait(state)) - shift_from_;
-    const balance::MinimumJerk shift(input.time - since_, kSetOff);
-    goal = shift_from_ + shift.position * way;
-    velocity = shift.speed * way;
-  } else if (stage_ == Stage::kShifting) {
-    const Vector2d way = state.sole[Other(plan_.foot)] - shift_from_;
-    const balance::MinimumJerk shift(input.time - since_, kTogetherShift);
-    goal = shift_from_ + shift.position * way;
-    velocity = shift.speed * way;
+  if (walks) {
+    const CaptureReference stride =
+        choice_.StrideReference(state, plan_.foot, gait(state), gait(state).period);
+    return PointFor(input, state, soles, stride, kSwingBudget);
   }
-  return PointFor(input, state, choice_.Soles(state), goal, velocity, kCatchBudget);
+  return PointFor(input, state, soles, {Goal(state), Vector2d::Zero()}, kCatchBudget);
 }
 
 bool Recovery::AtRest(const StepInput& input, const StepState& state) {
@@ -472,7 +469,7 @@ void Recovery::Archive(StateArchive* archive) {
   archive->Show(stage_, reason_, num_steps_, steps_now_, in_contact_, plan_, steps_, foot_, height_,
                 outside_, near_edge_, time_, since_, ramp_from_, stays_outside_, stays_near_edge_,
                 excess_at_edge_, moving_since_, cop_from_, standing_height_, together_asked_,
-                shift_from_, step_helps_, command_, turns_, heading_, stride_, output_);
+                shift_, step_helps_, command_, turns_, heading_, stride_, output_);
 }
 
 }  // namespace poise::stepping

@@ -95,10 +95,6 @@ class Recovery {
   Gait gait(const StepState& state) const;
   /// The step of a walk, or of a recovery where the walk's misses its place.
   StepPlan WalkOn(const StepState& state, Foot foot, double unload, StepReason* reason) const;
-  /// The centre of pressure of a walk on `stance`, within `support`, `left` s before the other sole
-  /// carries.
-  Eigen::Vector2d WalkingPoint(const StepInput& input, const StepState& state, Foot stance,
-                               const balance::ConvexPolygon& support, double left) const;
   /// From rest on both feet the capture point leaves for another place.
   void BeginShift(const StepInput& input, const StepState& state);
   /// From rest: the capture point goes to where the first step begins.
@@ -115,10 +111,11 @@ class Recovery {
   bool TogetherNow(const StepInput& input, const StepState& state, StepPlan* plan);
   /// The COM on its way above the foot that stays; then the other one leaves the ground.
   void Shift(const StepInput& input, const StepState& state, double excess);
-  /// The centre of pressure on `support` that leads the capture point along `goal`, m, m/s.
+  /// The centre of pressure on `support` that leads the capture point along `reference`, with the
+  /// return of the body to upright, which takes `budget`, m, of it at most.
   Eigen::Vector2d PointFor(const StepInput& input, const StepState& state,
-                           const balance::ConvexPolygon& support, const Eigen::Vector2d& goal,
-                           const Eigen::Vector2d& velocity, double budget) const;
+                           const balance::ConvexPolygon& support, const CaptureReference& reference,
+                           double budget) const;
   double UnloadTime() const;
   double LoadTime() const;
   /// Share of the ramp under way, unloading or loading, that has passed at `time`, s.
@@ -167,7 +164,7 @@ class Recovery {
   Eigen::Vector2d cop_from_ = Eigen::Vector2d::Zero();    // m, when the stage began
   bool step_helps_ = true;                                // of the last idle tick
   bool together_asked_ = false;
-  Eigen::Vector2d shift_from_ = Eigen::Vector2d::Zero();  // m, the capture point before it shifts
+  CaptureMove shift_;               // of the capture point from rest
   double standing_height_ = 0;      // m, above the soles, before the first step
   HeightLead height_{kHeightRate};  // m, world, of the COM's reference
   WalkCommand command_;

@@ -41,14 +41,6 @@ StepPlan Recovery::WalkOn(const StepState& state, Foot foot, double unload,
   return caught;
 }
 
-Vector2d Recovery::WalkingPoint(const StepInput& input, const StepState& state, Foot stance,
-                                const balance::ConvexPolygon& support, double left) const {
-  const Vector2d body = ForBody(input, kSwingBudget);
-  StepState with = state;
-  with.pendulum.com += body / (1 + kGain);
-  return choice_.StridePoint(with, stance, gait(state), left, support) - body;
-}
-
 void Recovery::SetOff(const StepInput& input, const StepState& state) {
   plan_ = StepPlan();
   plan_.foot = FirstFoot(command_);

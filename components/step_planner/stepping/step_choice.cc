@@ -205,16 +205,15 @@ Vector2d StepChoice::StrideBegin(const StepState& state, Foot stance, const Gait
   return state.sole[stance] + stride.begin;
 }
 
-Vector2d StepChoice::StridePoint(const StepState& state, Foot stance, const Gait& gait, double left,
-                                 const balance::ConvexPolygon& support) const {
+CaptureReference StepChoice::StrideReference(const StepState& state, Foot stance, const Gait& gait,
+                                             double left) const {
   const double w = state.pendulum.frequency;
   const Vector2d& sole = state.sole[stance];
   const auto stride = NominalStride({sole, state.sole_yaw[stance]}, Other(stance), gait.command,
                                     gait.period, w, StrideLimits());
-  const Vector2d then = stride.next.position - sole + stride.end;
-  const Vector2d error =
-      state.pendulum.capture_point() - sole - std::exp(-w * std::max(left, 0.0)) * then;
-  return balance::NearestPoint(support, sole + (1 + gait.gain) * error);
+  const Vector2d from_sole =
+      std::exp(-w * std::max(left, 0.0)) * (stride.next.position - sole + stride.end);
+  return {sole + from_sole, w * from_sole};
 }
 
 StepPlan StepChoice::StrideAt(const StepState& state, Foot foot, const Gait& gait,
@@ -224,7 +223,9 @@ StepPlan StepChoice::StrideAt(const StepState& state, Foot foot, const Gait& gai
                                     gait.period, state.pendulum.frequency, StrideLimits());
   const balance::ConvexPolygon sole = Sole(state, s);
   const double carries = time + gait.transfer;
-  StepPlan plan = Until(state, foot, carries, StridePoint(state, s, gait, carries, sole));
+  const Vector2d cop =
+      LeadingCop(state.pendulum, StrideReference(state, s, gait, carries), gait.gain, sole);
+  StepPlan plan = Until(state, foot, carries, cop);
   plan.time = time;
   plan.yaw = stride.next.yaw;
   const Vector2d wanted = plan.capture_point - stride.end - state.sole[s];

@@ -7,6 +7,7 @@
 #include "components/balance/convex_polygon.h"
 #include "components/framework/state_archive.h"
 #include "components/robot/robot_model.h"
+#include "components/step_planner/stepping/cop_plan.h"
 #include "components/step_planner/stepping/footsteps.h"
 #include "components/step_planner/stepping/legs.h"
 #include "components/step_planner/stepping/pendulum.h"
@@ -106,10 +107,10 @@ class StepChoice {
   StepPlan Stride(const StepState& state, Foot foot, const Gait& gait, double unload) const;
   /// m, world: the capture point as the other foot leaves the ground.
   Eigen::Vector2d StrideBegin(const StepState& state, Foot stance, const Gait& gait) const;
-  /// m, world: the centre of pressure within `support` that leads the capture point to where the
-  /// gait has it from the sole of `stance` with `left` s until the other one carries.
-  Eigen::Vector2d StridePoint(const StepState& state, Foot stance, const Gait& gait, double left,
-                              const balance::ConvexPolygon& support) const;
+  /// Where the gait has the capture point on the sole of `stance` with `left` s until the other one
+  /// carries: that sole's middle, as the centre of pressure, takes it there in time.
+  CaptureReference StrideReference(const StepState& state, Foot stance, const Gait& gait,
+                                   double left) const;
   /// The step of `foot` that puts it beside the other one, as when standing, with the COM above
   /// that.
   StepPlan Beside(const StepState& state, Foot foot, double time) const;

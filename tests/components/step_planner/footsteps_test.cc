@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "components/balance/minimum_jerk.h"
-#include "components/step_planner/stepping/pressed_sole.h"
+#include "components/step_planner/stepping/sole_memory.h"
 #include "components/step_planner/stepping/quasi_static_walk.h"
 #include "components/step_planner/stepping/stride_correction.h"
 #include "tests/robot/robot_test_support.h"
@@ -218,7 +218,7 @@ TEST(StrideCorrection, StaysWithinBounds) {
   EXPECT_LT((correction.factor() - Vector3d(1.4, 0.9, 1.4)).norm(), 1e-12);
 }
 
-TEST(PressedSole, SinksByItsSpringAndNotByLyingDown) {
+TEST(SoleMemory, SinksByItsSpringAndNotByLyingDown) {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
   const robot::FootModel& foot = model.feet()[0];
   // Ground tilted by 8 degrees about both axes; each corner stands on a quarter of its stiffness.
@@ -237,7 +237,7 @@ TEST(PressedSole, SinksByItsSpringAndNotByLyingDown) {
     }
     Eigen::Isometry3d sole = Eigen::Isometry3d::Identity();
     sole.translation().z() = 0.03 + highest;
-    PressedSole pressed(foot);
+    SoleMemory pressed(foot);
     pressed.Touch(sole);
     EXPECT_EQ(pressed.Sunk(sole), 0);
     sole.linear() = lies;

@@ -1,4 +1,4 @@
-#include "components/step_planner/stepping/pressed_sole.h"
+#include "components/step_planner/stepping/sole_memory.h"
 
 #include <algorithm>
 
@@ -6,19 +6,29 @@
 
 namespace poise::stepping {
 
-PressedSole::PressedSole(const robot::FootModel& foot) {
+SoleMemory::SoleMemory(const robot::FootModel& foot) {
   for (const Eigen::Vector2d& corner : robot::SoleCorners(foot)) corner_[num_corners_++] = corner;
 }
 
-double PressedSole::Height(const Eigen::Isometry3d& sole, size_t corner) const {
+double SoleMemory::Height(const Eigen::Isometry3d& sole, size_t corner) const {
   return sole.translation().z() + sole.linear().row(2).head<2>().dot(corner_[corner]);
 }
 
-void PressedSole::Touch(const Eigen::Isometry3d& sole) {
+void SoleMemory::Touch(const Eigen::Isometry3d& sole) {
+  sinks_ = 0;
   for (size_t i = 0; i < num_corners_; ++i) height_[i] = Height(sole, i);
 }
 
-double PressedSole::Sunk(const Eigen::Isometry3d& sole) const {
+void SoleMemory::Expect(const Eigen::Isometry3d& sole, double load, double weight, double most) {
+  sinks_ = std::min(ExpectedSinking(Sunk(sole), load, weight), most);
+}
+
+void SoleMemory::Correct(const Eigen::Isometry3d& sole, double load, double weight) {
+  const double sunk = Sunk(sole);
+  sinks_ = std::min(sinks_, std::max(sunk, ExpectedSinking(sunk, load, weight)));
+}
+
+double SoleMemory::Sunk(const Eigen::Isometry3d& sole) const {
   if (num_corners_ == 0) return 0;
   double least = height_[0] - Height(sole, 0);
   for (size_t i = 1; i < num_corners_; ++i) least = std::min(least, height_[i] - Height(sole, i));
