@@ -121,7 +121,7 @@ bool PhaseSchedule::Unloads() const {
 
 WaitingFor PhaseSchedule::Hindrance(const ScheduleInput& input) const {
   // The ramp has ended by then: CheckStepPlannerConfig sees to that.
-  if (Unloads() && !input.com_over_foot[Other(robot::FootAt(phase().transition().foot()))]) {
+  if (Unloads() && !input.can_carry_alone[Other(robot::FootAt(phase().transition().foot()))]) {
     return WaitingFor::kCom;
   }
   if (BeforeTouchDown()) {
@@ -143,7 +143,7 @@ void PhaseSchedule::AdvanceTransition(const ScheduleInput& input) {
   const double due = origin_ + transition.delay();
   if (!transition_began_) {
     const bool is_due = input.time >= due - kTimeTolerance;
-    if (is_due && unloading && !input.com_over_foot[Other(robot::FootAt(transition.foot()))]) {
+    if (is_due && unloading && !input.can_carry_alone[Other(robot::FootAt(transition.foot()))]) {
       state_.waiting_for = WaitingFor::kCom;
       Postpone(input.time - due);
       return;

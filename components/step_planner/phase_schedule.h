@@ -20,10 +20,10 @@ enum class WaitingFor {
 
 /// What the robot says in one tick.
 struct ScheduleInput {
-  double time = 0;                                      ///< s, not decreasing
-  robot::FootArray<bool> com_over_foot{false, false};   ///< that foot alone can carry the robot
-  robot::FootArray<bool> foot_confirmed{false, false};  ///< of the foot that comes down
-  robot::FootArray<bool> contact_lost{false, false};    ///< a foot that is to carry does not
+  double time = 0;                                       ///< s, not decreasing
+  robot::FootArray<bool> can_carry_alone{false, false};  ///< that foot alone can carry the robot
+  robot::FootArray<bool> foot_confirmed{false, false};   ///< of the foot that comes down
+  robot::FootArray<bool> contact_lost{false, false};     ///< a foot that is to carry does not
   bool no_surface = false;  ///< the foot that came down found none and is up again
 };
 

@@ -153,7 +153,7 @@ void CheckArrow(const StepPlannerConfig& config, const PhaseGraph& graph,
 
 // m, the paper's distance of the limits from the edges of its sole: estimate and soft ground may be
 // off by as much.
-constexpr double kLengthReserve = 0.03, kWidthReserve = 0.025;
+constexpr double kLengthMargin = 0.03, kWidthMargin = 0.025;
 
 // Shares of touch_load below which contact is lost, so that it does not flicker, and at which a
 // search comes to a stand: above a touch by a reserve, below what tips the robot.
@@ -163,12 +163,12 @@ constexpr double kReleaseShare = 0.4, kPressShare = 2;
 
 balance::ConvexPolygon StanceSole(const robot::FootModel& foot) {
   if (!foot.rectangular()) {
-    return balance::SolePolygon(foot, std::min(kWidthReserve, 0.5 * robot::InnerRadius(foot)));
+    return balance::SolePolygon(foot, std::min(kWidthMargin, 0.5 * robot::InnerRadius(foot)));
   }
   const auto half = [](double size, double reserve) {
     return std::max(0.5 * size - reserve, 0.25 * size);
   };
-  return balance::Rectangle({half(foot.length, kLengthReserve), half(foot.width, kWidthReserve)});
+  return balance::Rectangle({half(foot.length, kLengthMargin), half(foot.width, kWidthMargin)});
 }
 
 LandingSpec MakeLandingSpec(const ContactConfirmation& config) {

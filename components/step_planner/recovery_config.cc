@@ -38,12 +38,14 @@ constexpr double kLeastSwingEffort = 0.35, kMostSwingEffort = 0.9;
 // m/s by which a filter as fast as the gears allow may misjudge a swing foot. Fitted: heron, whose
 // gears are soft, stands 41 of 96 pushes with 0.35 of the effort and 33 with 0.9.
 constexpr double kSpeedError = 0.11;
-// s of the ramp (61) before a foot leaves the ground, and s in the air at least.
+// s of the ramp (61) before a foot leaves the ground, and s in the air at least: shorter ones gain
+// nothing (docs/lab/steps).
 constexpr double kUnload = 0.02, kLeastSwing = 0.12;
-constexpr double kGap = 0.02;          // m between the soles, sideways
+// m between the soles, sideways: by less a swing foot misses its foothold.
+constexpr double kGap = 0.02;
 constexpr double kComLowering = 0.06;  // m by which longer steps lower the COM at most
 // rad off the joints' limits at footholds: as far as a leg's joint overshoots.
-constexpr double kJointReserve = 0.1;
+constexpr double kFootholdJointMargin = 0.1;
 // Share of the weight that an observed load must be above to be a landing: a leg that brakes its
 // swing was seen to be misjudged by 0.05, by more than three standard deviations.
 constexpr double kObservedLoad = 0.15;
@@ -122,13 +124,13 @@ stepping::StepChoice MakeStepChoice(const robot::RobotModel& model) {
                                   kSoleMargin, foot.name, foot.length, foot.width));
   }
   const double height = robot::StandingHeight(model);
-  const stepping::Reach reach(model, height, kComLowering, kJointReserve, kGap);
+  const stepping::Reach reach(model, height, kComLowering, kFootholdJointMargin, kGap);
   if (reach.empty()) {
     throw ConfigError("recovery",
                       fmt::format("lowers the COM by {} m; robot '{}' cannot stand so much lower "
                                   "than {} m with its joints {} rad off their limits: its file's "
                                   "stance or limits leave no room to step",
-                                  kComLowering, model.name(), height, kJointReserve));
+                                  kComLowering, model.name(), height, kFootholdJointMargin));
   }
   stepping::StepLimits limits;
   limits.sole_margin = kSoleMargin;
@@ -159,6 +161,7 @@ stepping::RecoverySpec MakeRecoverySpec(const RecoveryConfig& config,
   spec.landing.observed_load = kObservedLoad * model.total_mass() * robot::kGravity;
   // The first load counts: the foot bounces, and six milliseconds of steady load came 0.12 s late.
   spec.landing.touch_duration = spec.landing.settle = 0;
+  spec.landing.retracts = false;
   spec.landing.search_speed = stepping::Recovery::kSwing.touch_speed;
   spec.turn_share = TurningInertia(model) / (model.total_mass() * robot::kGravity);
   spec.watched_margin = watched_margin;

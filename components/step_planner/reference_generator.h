@@ -101,7 +101,7 @@ class ReferenceGenerator {
   /// m, world: where the COM's last move ends.
   const Eigen::Vector3d& com_target() const { return com_.target(); }
   /// Whether the COM's reference has come to rest, and no move of it is to come.
-  bool ComRests(double time) const { return time >= com_.end(); }
+  bool ComMoveEnded(double time) const { return time >= com_.end(); }
   /// The body rests at `rotation` from here on; its turns under way and to come are dropped.
   void HoldBody(const Eigen::Matrix3d& rotation) { body_turn_.Hold(rotation); }
   const ReferencePoint& foot(robot::Foot foot) const { return foot_[foot]; }

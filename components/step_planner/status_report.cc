@@ -106,9 +106,9 @@ void ReportRobot(const SupportView& view, const robot::RobotData& data, planner_
   for (const Foot f : kFeet) {
     out.next_in_contact[Index(f)] = then[f] ? 1 : 0;
     out.foot_state[Index(f)] =
-        view.in_contact[f] ? planner_status_t::FOOT_SUPPORT
-                           : FootCode(view.steps != nullptr ? view.steps->foot_state
-                                                            : view.landing[f].state());
+        view.in_contact[f]
+            ? planner_status_t::FOOT_SUPPORT
+            : FootCode(view.steps != nullptr ? view.steps->foot_state : view.landing[f].state());
     SetPose(data.foot_pose[f], &out.foot_pose[Index(f)]);
   }
 }

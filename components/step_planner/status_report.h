@@ -8,7 +8,7 @@
 #include "components/framework/tick_time.h"
 #include "components/robot/dynamics.h"
 #include "components/step_planner/stepping/footwork.h"
-#include "components/step_planner/support_order.h"
+#include "components/step_planner/support_plan_message.h"
 #include "poise/planner_status_t.hpp"
 
 namespace poise {

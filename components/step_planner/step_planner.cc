@@ -16,7 +16,7 @@
 #include "components/step_planner/recovery_config.h"
 #include "components/step_planner/status_report.h"
 #include "components/step_planner/step_planner_type.h"
-#include "components/step_planner/support_order.h"
+#include "components/step_planner/support_plan_message.h"
 
 namespace poise {
 
@@ -39,7 +39,7 @@ constexpr double kFollowFrom = 0.005;
 constexpr double kSettleTime = 0.5;
 
 // rad, nearer than which no stance leg's joint may come to its limit while the body turns.
-constexpr double kJointReserve = 0.02;
+constexpr double kLeastJointMargin = 0.02;
 
 stepping::WalkCommand CommandOf(const ::steps::stride_t& stride) {
   stepping::WalkCommand command;
@@ -69,17 +69,17 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   const LandingSpec landing = MakeLandingSpec(config.contact());
   landing_ = robot::FootArray<Landing>(Landing(landing));
   contact_loss_ = robot::FootArray<ContactLoss>(ContactLoss(landing.release_load));
-  walks_by_steps_ = config.walk().enabled() && !config.walk().quasi_static();
-  makes_steps_ = config.recovery().enabled() || walks_by_steps_;
-  if (makes_steps_) {
+  walks_dynamically_ = config.walk().enabled() && !config.walk().quasi_static();
+  has_recovery_ = config.recovery().enabled() || walks_dynamically_;
+  if (has_recovery_) {
     recovery_ = MakeRecovery(config.recovery(), config.contact(), *model_,
                              tilts_ ? HipStrategy::kStart : -1);
   }
-  walks_quasi_static_ = config.walk().enabled() && !walks_by_steps_;
-  stride_port_ = walks_by_steps_ && config.walk().stride_port();
+  walks_quasi_static_ = config.walk().enabled() && !walks_dynamically_;
+  stride_port_ = walks_dynamically_ && config.walk().stride_port();
   if (walks_quasi_static_) walk_ = MakeQuasiStaticWalk(config.walk(), config.contact(), *model_);
   footstep_report_ =
-      FootstepReport(makes_steps_ ? &recovery_ : nullptr, walks_quasi_static_ ? &walk_ : nullptr);
+      FootstepReport(has_recovery_ ? &recovery_ : nullptr, walks_quasi_static_ ? &walk_ : nullptr);
   walk_commands_ = WalkCommands(config.walk());
   state_ = robot::RobotState(model_->num_joints());
   in_contact_ = ContactsOf(config.phase(0).support());
@@ -94,7 +94,7 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   wiring->AddOutput(&support_plan_, "support_plan", FootCounts(*model_));
   wiring->AddOutput(&planner_status_, "planner_status", FootCounts(*model_));
   std::vector<OutputPort*> outputs{&support_plan_, &planner_status_};
-  if (makes_steps_ || walks_quasi_static_) {
+  if (has_recovery_ || walks_quasi_static_) {
     wiring->AddOutput(&footsteps_, "footsteps", {});
     footsteps_->stance = -1;
     outputs.push_back(&footsteps_);
@@ -135,12 +135,12 @@ void StepPlanner::ConfigureLimits(const StepPlannerConfig& config) {
 
 bool StepPlanner::Archive(StateArchive* archive) {
   archive->Show(operator_, operator_walk_, *schedule_, generator_, stance_follower_, hip_strategy_,
-                references_, in_contact_, last_controlled_, owner_, untilted_, was_free_,
-                step_needed_, planned_, recovery_, walk_, footstep_report_);
+                references_, in_contact_, has_tasks_, owner_, untilted_, was_free_, step_needed_,
+                planned_, recovery_, walk_, footstep_report_);
   for (const Foot f : kFeet) archive->Show(landing_[f], contact_loss_[f]);
   ArchiveMessage(&*support_plan_, archive);
   ArchiveMessage(&*planner_status_, archive);
-  if (makes_steps_ || walks_quasi_static_) ArchiveMessage(&*footsteps_, archive);
+  if (has_recovery_ || walks_quasi_static_) ArchiveMessage(&*footsteps_, archive);
   return true;
 }
 
@@ -155,7 +155,7 @@ int8_t StepPlanner::Act(const operate::act_t& act, double time) {
   using operate::answer_t;
   switch (act.kind) {
     case act_t::KIND_WALK:
-      if (!walks_quasi_static_ && !walks_by_steps_) return answer_t::VERDICT_NOT_ABLE;
+      if (!walks_quasi_static_ && !walks_dynamically_) return answer_t::VERDICT_NOT_ABLE;
       for (int i = 0; i < 3; ++i) {
         if (!(std::abs(act.velocity[i]) <= kFastestWalk)) return answer_t::VERDICT_RANGE;
       }
@@ -163,9 +163,9 @@ int8_t StepPlanner::Act(const operate::act_t& act, double time) {
       std::copy_n(act.velocity, 3, operator_walk_.velocity);
       return answer_t::VERDICT_DONE;
     case act_t::KIND_STAND:
-      if (!walks_quasi_static_ && !makes_steps_) return answer_t::VERDICT_NOT_ABLE;
-      if (makes_steps_ && owner_ != FeetOwner::kWalk) {
-        const bool stands = Count(in_contact_) == 2 && last_controlled_;
+      if (!walks_quasi_static_ && !has_recovery_) return answer_t::VERDICT_NOT_ABLE;
+      if (has_recovery_ && owner_ != FeetOwner::kWalk) {
+        const bool stands = Count(in_contact_) == 2 && has_tasks_;
         const bool rests = stands && owner_ != FeetOwner::kRecovery;
         if (!walks_quasi_static_ && !rests && !recovery_.command().stepping) {
           return answer_t::VERDICT_NOT_NOW;
@@ -175,9 +175,9 @@ int8_t StepPlanner::Act(const operate::act_t& act, double time) {
       operator_walk_ = {.given = true};
       return answer_t::VERDICT_DONE;
     case act_t::KIND_STEP: {
-      if (!walks_quasi_static_ && !walks_by_steps_) return answer_t::VERDICT_NOT_ABLE;
+      if (!walks_quasi_static_ && !walks_dynamically_) return answer_t::VERDICT_NOT_ABLE;
       if (act.foot >= static_cast<int>(kFeet.size())) return answer_t::VERDICT_UNKNOWN;
-      const bool stands = Count(in_contact_) == 2 && last_controlled_;
+      const bool stands = Count(in_contact_) == 2 && has_tasks_;
       if (!stands || Steps() != nullptr) return answer_t::VERDICT_NOT_NOW;
       operator_walk_ = {.given = true, .one_step = true, .steps_before = NumSteps()};
       // Walking begins with the foot of the side that it goes to.
@@ -193,7 +193,7 @@ int8_t StepPlanner::Act(const operate::act_t& act, double time) {
 }
 
 stepping::WalkCommand StepPlanner::WalkCommandAt(double time) const {
-  const int begun = walks_by_steps_ ? recovery_.num_steps() : walk_.num_begun();
+  const int begun = walks_dynamically_ ? recovery_.num_steps() : walk_.num_begun();
   if (!operator_walk_.given) return stride_port_ ? planned_ : walk_commands_.At(time, begun);
   const double* const v = operator_walk_.velocity;
   bool stepping = operator_walk_.stepping;
@@ -215,7 +215,7 @@ int8_t StepPlanner::Plan(double time) {
   }
   whole_body_->UpdateDynamics(state_);
   const ScheduleInput observed = Observe(time, load);
-  LeadFeet(time, load);
+  ChooseOwner(time, load);
   if (Held()) {
     schedule_->Hold(time);
   } else if (schedule_->Advance(observed).phase_began) {
@@ -230,7 +230,7 @@ int8_t StepPlanner::Plan(double time) {
 }
 
 ScheduleInput StepPlanner::Observe(double time, const robot::FootArray<double>& load) {
-  ScheduleInput input{.time = time, .com_over_foot = ComOverFoot()};
+  ScheduleInput input{.time = time, .can_carry_alone = CanCarryAlone()};
   for (const Foot f : kFeet) {
     const double deviation = LoadDeviation(f);
     landing_[f].Measure(time, load[f], deviation);
@@ -249,10 +249,10 @@ double StepPlanner::LoadDeviation(Foot foot) const {
              : 0;
 }
 
-void StepPlanner::LeadFeet(double time, const robot::FootArray<double>& load) {
-  if (!makes_steps_ && !walks_quasi_static_) return;
-  const stepping::StepInput input = SeeSteps(time, load);
-  if (makes_steps_ && (owner_ != FeetOwner::kWalk || walk_.Lost(input)) &&
+void StepPlanner::ChooseOwner(double time, const robot::FootArray<double>& load) {
+  if (!has_recovery_ && !walks_quasi_static_) return;
+  const stepping::StepInput input = MakeStepInput(time, load);
+  if (has_recovery_ && (owner_ != FeetOwner::kWalk || walk_.Lost(input)) &&
       recovery_.Update(input)) {
     HandOver(FeetOwner::kRecovery, time);
     walk_.Stop(time);
@@ -282,7 +282,7 @@ void StepPlanner::HandOver(FeetOwner to, double time) {
   owner_ = to;
 }
 
-stepping::StepInput StepPlanner::SeeSteps(double time, const robot::FootArray<double>& load) {
+stepping::StepInput StepPlanner::MakeStepInput(double time, const robot::FootArray<double>& load) {
   const robot::RobotData& data = whole_body_->data();
   stepping::StepInput input;
   input.time = time;
@@ -299,8 +299,8 @@ stepping::StepInput StepPlanner::SeeSteps(double time, const robot::FootArray<do
   input.in_contact = in_contact_;
   input.com_height = references_.com.position.z();
   input.step_needed = planner_status_->step_needed != 0;
-  input.allowed = last_controlled_;
-  if (walks_by_steps_) input.command = WalkCommandAt(time);
+  input.allowed = has_tasks_;
+  if (walks_dynamically_) input.command = WalkCommandAt(time);
   for (const Foot f : kFeet) {
     if (in_contact_[f]) continue;
     input.free_foot = references_.foot[f];
@@ -352,7 +352,7 @@ void StepPlanner::BeginPhase(double time) {
     contact_loss_[f].Reset();
     if (in_contact_[f]) continue;
     was_free_ = true;
-    if (last_contact[f] || !last_controlled_) {
+    if (last_contact[f] || !has_tasks_) {
       references_.foot[f].position = estimate.sole[f].translation();
       references_.foot_rotation[f].rotation = estimate.sole[f].linear();
       landing_[f].LiftOff(references_.foot[f].position.z());
@@ -366,7 +366,7 @@ void StepPlanner::BeginPhase(double time) {
       generator_.HoldFoot(f, standing.position, references_.foot_rotation[f].rotation);
     }
   }
-  last_controlled_ = !phase.gravity_compensation();
+  has_tasks_ = !phase.gravity_compensation();
 }
 
 void StepPlanner::Report(double time, const Capture& capture) {
@@ -377,7 +377,7 @@ void StepPlanner::Report(double time, const Capture& capture) {
                          .steps = Steps(),
                          .in_contact = in_contact_,
                          .landing = landing_};
-  OrderSupport(view, estimate, references_, &*support_plan_);
+  FillSupportPlan(view, estimate, references_, &*support_plan_);
   status->feet_owner = static_cast<int8_t>(owner_);
   ReportPhase(view, time, status);
   ReportRobot(view, whole_body_->data(), status);
@@ -386,7 +386,7 @@ void StepPlanner::Report(double time, const Capture& capture) {
   if (soles.num_corners > 0) {
     ReportCapture(time, capture.frame_o, soles, capture.pendulum, &step_needed_, status);
   }
-  if (!makes_steps_ && !walks_quasi_static_) return;
+  if (!has_recovery_ && !walks_quasi_static_) return;
   const bool walking = walks_quasi_static_ && owner_ != FeetOwner::kRecovery;
   ReportStepping(walking ? walk_.status() : recovery_.status(),
                  walking && walk_.active() ? walk_.command() : recovery_.command(), time,
@@ -396,7 +396,7 @@ void StepPlanner::Report(double time, const Capture& capture) {
                             .com_height = estimate.com.z(),
                             .sole = estimate.sole,
                             .in_contact = in_contact_};
-  footstep_report_.Update(input, makes_steps_ ? &recovery_ : nullptr,
+  footstep_report_.Update(input, has_recovery_ ? &recovery_ : nullptr,
                           walks_quasi_static_ ? &walk_ : nullptr, &*footsteps_);
 }
 
@@ -416,9 +416,9 @@ void StepPlanner::FollowSoles(double time) {
   const StanceFollower::Stance stance{
       .sole = {estimate.sole[Foot::kRight].translation(), estimate.sole[Foot::kLeft].translation()},
       .com = generator_.com_target(),
-      .planned = Count(in_contact_) == 2 && last_controlled_ && !Held() && !was_free_,
+      .planned = Count(in_contact_) == 2 && has_tasks_ && !Held() && !was_free_,
       .carried = robot_state_->foot_load_share[0] > 0 && robot_state_->foot_load_share[1] > 0,
-      .resting = generator_.ComRests(time)};
+      .resting = generator_.ComMoveEnded(time)};
   const Eigen::Vector3d way = stance_follower_.Update(time, stance);
   if (!way.isZero(0)) generator_.ShiftCom(way, time, kSettleTime);
 }
@@ -474,7 +474,7 @@ void StepPlanner::TiltBody(double time, const Capture& capture) {
     }
   }
   // The turning body takes of the centre of pressure that a step needs.
-  if (makes_steps_ && recovery_.would_step()) input.excess.setZero();
+  if (has_recovery_ && recovery_.would_step()) input.excess.setZero();
   // About one axis the rotation vector's derivatives are the angular velocity and acceleration; of
   // a turn that goes over into another, or comes upon the plan's own, only nearly.
   const PointMotion tilt = hip_strategy_.Update(input);
@@ -495,7 +495,7 @@ bool StepPlanner::NearJointLimit() const {
       const double position = state_.joint_position[joint], speed = state_.joint_velocity[joint];
       const double room = speed > 0 ? limits.upper - position : position - limits.lower;
       // At an even deceleration a joint goes on for half of the time that braking takes.
-      if (0.5 * HipStrategy::kBrakeTime * std::abs(speed) > room - kJointReserve) return true;
+      if (0.5 * HipStrategy::kBrakeTime * std::abs(speed) > room - kLeastJointMargin) return true;
     }
   }
   return false;
@@ -518,7 +518,7 @@ balance::ConvexPolygon StepPlanner::Soles(
   return balance::SupportPolygon(frame_o, Geometry(), sole);
 }
 
-robot::FootArray<bool> StepPlanner::ComOverFoot() const {
+robot::FootArray<bool> StepPlanner::CanCarryAlone() const {
   const robot::RobotData& data = whole_body_->data();
   robot::FootArray<bool> over;
   for (const Foot f : kFeet) {

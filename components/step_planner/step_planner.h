@@ -27,16 +27,17 @@
 
 namespace poise {
 
-/// Who moves the feet in a tick.
+/// Who moves the feet in a tick. stepping::Recovery makes the steps of a dynamic walk, too, and
+/// puts the feet side by side: their owner is kRecovery. kWalk is the quasi-static walk alone.
 ///
 /// | from           | to       | when |
 /// |----------------|----------|------|
-/// | phases, stance | recovery | a push needs a step, or the feet are to be put side by side |
-/// | phases, stance | walk     | it is told to walk |
-/// | walk           | recovery | on one foot the capture point has left the stance sole |
-/// | recovery       | walk     | at rest, and told to walk |
-/// | recovery, walk | phases   | at rest on the feet that the phase stands on |
-/// | recovery, walk | stance   | at rest on both feet, where the phase stands on one |
+/// | phases, stance | recovery | a push needs a step, a dynamic walk or feet side by side are asked
+/// for | | phases, stance | walk     | a quasi-static walk is commanded, and both feet are contacts
+/// | | walk           | recovery | on one foot the capture point has left the stance sole | |
+/// recovery       | walk     | it has ended, and a quasi-static walk is commanded | | recovery,
+/// walk | phases   | it has ended on the feet that the phase stands on | | recovery, walk | stance
+/// | it has ended on both feet, where the phase stands on one |
 enum class FeetOwner : int8_t {
   kPhases = planner_status_t::OWNER_PHASES,
   kRecovery = planner_status_t::OWNER_RECOVERY,
@@ -57,7 +58,8 @@ class StepPlanner : public Component, public Operated {
   struct Capture {
     bool known = false;  ///< else the COM is below the soles, or a number is not finite
     Eigen::Isometry3d frame_o = Eigen::Isometry3d::Identity();
-    balance::CapturePoint pendulum;  ///< of the COM's own momentum
+    /// Of the COM's own momentum alone; Recovery's counts half of the angular momentum, too.
+    balance::CapturePoint pendulum;
   };
 
   void ConfigureLimits(const StepPlannerConfig& config);
@@ -66,8 +68,8 @@ class StepPlanner : public Component, public Operated {
   int8_t Act(const operate::act_t& act, double time);
   /// The scenario's or the port's, until an operator has commanded another.
   stepping::WalkCommand WalkCommandAt(double time) const;
-  /// Steps of what walks here.
-  int NumSteps() const { return walks_by_steps_ ? recovery_.num_steps() : walk_.num_steps(); }
+  /// Steps since the start: begun ones of a dynamic walk, landed ones of a quasi-static walk.
+  int NumSteps() const { return walks_dynamically_ ? recovery_.num_steps() : walk_.num_steps(); }
   /// STATUS_* of the plan.
   int8_t Plan(double time);
   /// What the robot says to the schedule.
@@ -75,14 +77,14 @@ class StepPlanner : public Component, public Operated {
   /// N, standard deviation of an observed load; 0 of a measured one.
   double LoadDeviation(robot::Foot foot) const;
   /// Runs the tick of recovery and walk, and settles who owns the feet.
-  void LeadFeet(double time, const robot::FootArray<double>& load);
+  void ChooseOwner(double time, const robot::FootArray<double>& load);
   void HandOver(FeetOwner to, double time);
-  stepping::StepInput SeeSteps(double time, const robot::FootArray<double>& load);
+  stepping::StepInput MakeStepInput(double time, const robot::FootArray<double>& load);
   /// What leads COM and feet in place of the schedule; null: nothing does.
   const stepping::StepOutput* Steps() const;
   /// References from where `steps` have left the robot.
   void EndSteps(const stepping::StepOutput& steps, double time);
-  /// The schedule waits.
+  /// Another planner than the phases owns the feet: the schedule is held, which is no waiting.
   bool Held() const { return owner_ != FeetOwner::kPhases; }
   /// The body's heading follows the feet.
   void TurnBody(const Quintic::Point& yaw);
@@ -104,7 +106,7 @@ class StepPlanner : public Component, public Operated {
                                const robot::FootArray<balance::ConvexPolygon>& sole) const;
   /// By foot: it alone can carry the robot, as the capture point, where the COM can be brought to
   /// rest, lies inside its reduced sole. At rest that is the COM's projection, and the CoP.
-  robot::FootArray<bool> ComOverFoot() const;
+  robot::FootArray<bool> CanCarryAlone() const;
   /// Fills the tick's messages, but for the plan's status.
   void Report(double time, const Capture& capture);
 
@@ -125,10 +127,10 @@ class StepPlanner : public Component, public Operated {
   robot::FootArray<Landing> landing_{Landing(LandingSpec())};
   robot::FootArray<ContactLoss> contact_loss_{ContactLoss(0)};
   HeldCondition step_needed_;
-  bool makes_steps_ = false;  // recovery_ is there
+  bool has_recovery_ = false;  // recovery_ is there
   stepping::Recovery recovery_;
   bool walks_quasi_static_ = false;  // by walk_
-  bool walks_by_steps_ = false;      // by recovery_
+  bool walks_dynamically_ = false;   // by recovery_
   bool stride_port_ = false;
   stepping::WalkCommand planned_;  // of the port's last message
   stepping::QuasiStaticWalk walk_;
@@ -149,7 +151,7 @@ class StepPlanner : public Component, public Operated {
       Eigen::Matrix3d::Identity();  // the body's reference less the hip strategy's tilt
   robot::RobotState state_;
   robot::FootArray<bool> in_contact_{true, true};
-  bool last_controlled_ = false;  // the phase before had tasks
+  bool has_tasks_ = false;  // of the phase; until BeginPhase has ended: of the one before it
   // m, sole frames: whole, less what the hip strategy starts from, and what one foot balances on.
   robot::FootArray<balance::ConvexPolygon> sole_, tilt_sole_, stance_sole_;
 };

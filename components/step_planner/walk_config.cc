@@ -74,11 +74,11 @@ constexpr double kYawRate = 5;        // 1/s with which the body's heading follo
 constexpr double kTurnAcceleration = 0.2;  // rad/s² with which the turn rate is approached
 // Not scaled: joints keep off their limits by an angle, and a hard sole bounces as long on any
 // robot.
-constexpr double kJointReserve = 0.1;     // rad off the joints' limits at footholds
-constexpr double kTouchDuration = 0.002;  // s of contact.touch_load that are a landing
-// A foot that touches is let go with a time constant of this share of its settling, which counts
-// as kLongestRelaxing, s, at most.
-constexpr double kRelaxShare = 0.25, kLongestRelaxing = 0.06;
+constexpr double kFootholdJointMargin = 0.1;  // rad off the joints' limits at footholds
+constexpr double kTouchDuration = 0.002;      // s of contact.touch_load that are a landing
+// s, time constant with which a foot that has touched is let go in the ground's plane: some ticks,
+// as it settles for a fifth of a second.
+constexpr double kRelaxTime = 0.015;
 
 constexpr double kRounding = 1e-6;
 
@@ -144,7 +144,7 @@ StrideSize DynamicStride(const robot::RobotModel& model) {
   return {limits.longest,
           limits.widest,
           limits.most_turn,
-          stepping::Recovery::kStride / frequency,
+          stepping::Recovery::kOmegaStepTime / frequency,
           {"the legs span", "the legs span", "a foot turns"}};
 }
 
@@ -187,7 +187,7 @@ void CheckGround(const WalkConfig& config) {
 void CheckWalkConfig(const WalkConfig& config) {
   CheckCommands(config);
   CheckGround(config);
-  // A foot of a walk is let go before it counts as a contact.
+  // Only a dynamic walk takes its footholds from the port.
   if (config.stride_port() && (!config.enabled() || config.quasi_static())) {
     throw ConfigError("walk.stride_port",
                       "is true: needs walk.enabled=true and walk.quasi_static=false");
@@ -197,19 +197,19 @@ void CheckWalkConfig(const WalkConfig& config) {
 stepping::StepChoice MakeWalkChoice(const WalkConfig& config, const robot::RobotModel& model) {
   const double height = robot::StandingHeight(model);
   const double lowering = RobotScale(model).Length(kReachLowering);
-  const stepping::Reach reach(model, height, lowering, kJointReserve, config.gap());
+  const stepping::Reach reach(model, height, lowering, kFootholdJointMargin, config.gap());
   if (reach.empty()) {
     throw ConfigError(
         "walk", fmt::format("robot '{}', whose COM stands {:.3f} m high, cannot stand {:.3f} m "
                             "lower with {} rad between its joints and their limits: its file's "
                             "stance or limits leave no room to walk",
-                            model.name(), height, lowering, kJointReserve));
+                            model.name(), height, lowering, kFootholdJointMargin));
   }
   stepping::StepLimits limits;
   limits.sole_margin = kSoleMarginShare * LeastInnerRadius(model);
   limits.spacing = std::max(robot::StandingSpacing(model), reach.least_spacing());
   CheckLegs(config, model, reach, limits.spacing);
-  CheckStanceLegs(LiftOffDistance(model, limits), model, reach, height, kJointReserve);
+  CheckStanceLegs(LiftOffDistance(model, limits), model, reach, height, kFootholdJointMargin);
   return {model, reach, limits};
 }
 
@@ -238,10 +238,11 @@ stepping::QuasiStaticSpec MakeQuasiStaticSpec(const WalkConfig& config,
   spec.landing.touch_duration = kTouchDuration;
   spec.landing.settle = scale.Time(kSettle);
   spec.landing.search_speed = scale.Speed(kTouchSpeed);
-  spec.landing.relax_time = kRelaxShare * std::min(spec.landing.settle, kLongestRelaxing);
+  spec.landing.relax_time = kRelaxTime;
   spec.landing.press_load =
-      std::max(stepping::QuasiStaticWalk::kPressShare * weight, contact.touch_load());
+      std::max(stepping::QuasiStaticWalk::kPressShare * weight, spec.landing.press_load);
   spec.landing.presses = true;
+  spec.landing.retracts = false;
   spec.most_offset = kOffsetShare * radius;
   spec.com_lowering = scale.Length(kComLowering);
   spec.height_rate = scale.Rate(kHeightRate);

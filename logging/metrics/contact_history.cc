@@ -9,7 +9,8 @@ namespace {
 
 // A reading beyond this many standard deviations of its noise is a load.
 constexpr double kNoiseDeviations = 5;
-// m from its reference's end, beyond which a contact is reported as early or late.
+// m from its reference's end, beyond which a contact is reported as early or late: a sole that
+// tilts or sinks is off by less.
 constexpr double kExpectedWithin = 0.02;
 
 std::array<bool, 2> Contacts(const std::vector<int8_t>& in_contact) {
@@ -110,7 +111,8 @@ std::vector<TouchDown> TouchDowns(const RunRecord& run) {
       const int8_t was = before->foot_state[foot], is = planner->foot_state[foot];
       const bool off =
           was != planner_status_t::FOOT_SUPPORT && was != planner_status_t::FOOT_TOUCHING;
-      // The schedule alone decided on a foot that goes from a swing straight to support.
+      // A recovery's foot goes from a swing straight to support: it is a contact from its first
+      // load on.
       const bool confirmed =
           is == planner_status_t::FOOT_TOUCHING ||
           (is == planner_status_t::FOOT_SUPPORT && was == planner_status_t::FOOT_SEARCHING);

@@ -14,7 +14,7 @@ struct PlannerStep {
   size_t foot = 0;
   int8_t reason = 0;                                   ///< planner_status_t::REASON_*
   int64_t begin = 0;                                   ///< tick of the decision
-  double planned_time = 0;                             ///< s to touch-down, then; 0: not timed yet
+  double planned_time = 0;                             ///< s to touch-down, then
   Eigen::Vector2d from = Eigen::Vector2d::Zero();      ///< m, world, the sole's centre then
   Eigen::Vector2d planned = Eigen::Vector2d::Zero();   ///< m, world, the foothold then
   std::optional<int64_t> landing;                      ///< tick; empty: it did not land

@@ -6,7 +6,7 @@
 
 namespace poise {
 
-/// Lost once a foot that is to carry has measured less than LoadLevels' release for kLostDuration;
+/// Lost once a foot that is to carry has measured less than release_load for kLostDuration;
 /// no longer with the first measurement above, or when it is not to carry any more.
 class ContactLoss {
  public:

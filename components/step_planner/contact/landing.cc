@@ -33,16 +33,16 @@ bool TouchDetector::Update(double time, double load, const LoadLevels& levels) {
 
 void Landing::LiftOff(double z) {
   touch_.Reset(true);
-  left_ = false;
+  has_left_ground_ = false;
   state_ = State::kSwing;
-  lowered_ = false;
+  moves_down_ = false;
   end_height_ = z;
 }
 
 void Landing::BeginSwing(double z, double rises_until) {
   LiftOff(z);
   touch_.Reset(false);
-  left_ = true;
+  has_left_ground_ = true;
   move_end_ = rises_until;
 }
 
@@ -50,10 +50,10 @@ bool Landing::BeginMove(double from, double to, double end) {
   if (state_ == State::kRetracted) return false;
   if (state_ == State::kTouching) {
     if (to < from) return false;
-    left_ = false;
+    has_left_ground_ = false;
   }
   state_ = State::kSwing;
-  lowered_ = to < from;
+  moves_down_ = to < from;
   move_end_ = end;
   end_height_ = to;
   return true;
@@ -62,8 +62,8 @@ bool Landing::BeginMove(double from, double to, double end) {
 void Landing::Release() {
   if (state_ != State::kSearching && state_ != State::kRetracted) return;
   state_ = State::kSwing;
-  lowered_ = false;
-  left_ = true;
+  moves_down_ = false;
+  has_left_ground_ = true;
 }
 
 void Landing::Measure(double time, double load, double deviation) {
@@ -73,18 +73,18 @@ void Landing::Measure(double time, double load, double deviation) {
   levels_ = LoadLevels(spec_, deviation);
   const bool before = touch_.touching();
   if (touch_.Update(time, load, levels_) && !before) touched_ = time;
-  if (spec_.presses && load < kPressed * levels_.press) touched_ = time;
+  if (spec_.presses && load < kPressed * spec_.press_load) touched_ = time;
 }
 
 bool Landing::confirmed() const {
   if (!touch_.touching()) return false;
-  if (state_ == State::kSwing) return !left_;
+  if (state_ == State::kSwing) return !has_left_ground_;
   return state_ == State::kTouching && time_ - touched_ >= spec_.settle - kTimeTolerance;
 }
 
 bool Landing::SearchBegins(bool before_touch_down, bool due) const {
   if (!before_touch_down) return false;
-  return due || (lowered_ && time_ >= move_end_ - kTimeTolerance);
+  return due || (moves_down_ && time_ >= move_end_ - kTimeTolerance);
 }
 
 void Landing::Enter(State state, const PointMotion& reference, const Eigen::Matrix3d& rotation) {
@@ -100,11 +100,11 @@ void Landing::AdvanceState(bool before_touch_down, bool due, const Eigen::Isomet
   const bool searches = SearchBegins(before_touch_down, due);
   switch (state_) {
     case State::kSwing:
-      left_ = left_ || !touching;
+      has_left_ground_ = has_left_ground_ || !touching;
       // A tap on the way up is left behind by going on.
-      if (left_ && touching && !Rises()) {
+      if (has_left_ground_ && touching && !Rises()) {
         Enter(State::kTouching, reference, rotation);
-      } else if (left_ && searches) {
+      } else if (has_left_ground_ && searches) {
         Enter(State::kSearching, reference, rotation);
       }
       break;
@@ -114,6 +114,8 @@ void Landing::AdvanceState(bool before_touch_down, bool due, const Eigen::Isomet
       const double depth = spec_.search_depth;
       if (touching) {
         state_ = State::kTouching;
+      } else if (!spec_.retracts) {
+        break;
       } else if (sole.translation().z() <= end_height_ - depth ||
                  reference_.position.z() <= end_height_ - 2 * depth) {
         state_ = State::kRetracted;
@@ -135,6 +137,9 @@ void Landing::Search() {
   const Eigen::Vector3d velocity(0, 0, -spec_.search_speed * missing);
   reference_.velocity += Share(kVelocityTime) * (velocity - reference_.velocity);
   reference_.position += period_ * reference_.velocity;
+  if (spec_.retracts || reference_.position.z() > Lowest()) return;
+  reference_.position.z() = Lowest();
+  reference_.velocity.z() = 0;
 }
 
 void Landing::Touch(const Eigen::Isometry3d& sole) {
@@ -142,7 +147,7 @@ void Landing::Touch(const Eigen::Isometry3d& sole) {
   double down = 0;
   if (spec_.presses) {
     share.z() = 0;
-    down = std::clamp(1 - load_ / levels_.press, -1.0, 1.0);
+    down = std::clamp(1 - load_ / spec_.press_load, -1.0, 1.0);
   } else {
     const double loaded =
         std::clamp((load_ - levels_.release) / (levels_.touch - levels_.release), 0.0, 1.0);
@@ -150,7 +155,9 @@ void Landing::Touch(const Eigen::Isometry3d& sole) {
     down = 1 - loaded;
   }
   reference_.position += share.cwiseProduct(sole.translation() - reference_.position);
-  reference_.position.z() -= period_ * spec_.search_speed * down;
+  double& z = reference_.position.z();
+  const double next = z - period_ * spec_.search_speed * down;
+  z = spec_.presses ? std::max(next, std::min(z, Lowest())) : next;
   // Not that of the reference's coming back, which would lift the foot.
   reference_.velocity -= Share(std::min(spec_.relax_time, kVelocityTime)) * reference_.velocity;
   rotation_ = Eigen::Quaterniond(rotation_)
@@ -180,8 +187,8 @@ bool Landing::Update(bool before_touch_down, bool due, const Eigen::Isometry3d& 
 }
 
 void Landing::Archive(StateArchive* archive) {
-  archive->Show(touch_, state_, time_, period_, load_, levels_, touched_, left_, lowered_,
-                move_end_, end_height_, reference_, rotation_, retreat_);
+  archive->Show(touch_, state_, time_, period_, load_, levels_, touched_, has_left_ground_,
+                moves_down_, move_end_, end_height_, reference_, rotation_, retreat_);
 }
 
 }  // namespace poise

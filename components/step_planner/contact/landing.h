@@ -19,8 +19,9 @@ struct LandingSpec {
   double observed_load = 0;  ///< N that an observed load must be above at least to be contact
   /// s that a load must last, or its loss: ten periods of 500 Hz, longer than the sensor's noise.
   double touch_duration = 0.02;
-  /// s from the touch until the foot counts as a contact, three times relax_time: what the lowering
-  /// presses with is given back first, so that the model's change makes no step of the torque.
+  /// s from the touch until the foot counts as a contact. The default is three times relax_time's:
+  /// what the lowering presses with is given back first, so that the model's change makes no step
+  /// of the torque.
   double settle = 0.3;
   double search_depth = 0;  ///< m that it goes on downward at most
   /// m/s, with which it does: slow enough that the load stops it before it tips the robot.
@@ -29,6 +30,8 @@ struct LandingSpec {
   double relax_time = 0.1;
   /// A touching foot is pressed down with press_load, and settles while it is; else it is let go.
   bool presses = false;
+  /// A foot that finds no ground rises again; else it waits at search_depth for a load.
+  bool retracts = true;
 };
 
 /// N: the loads of a landing, raised where the load is not known so well.
@@ -69,6 +72,8 @@ class TouchDetector {
 /// surface that rises, and the change of the model's contact makes no step of the torque. In z this
 /// is mixed with the search, by the load from `touch` (let go) down to `release` (search), so that
 /// contact stays measured when no joint friction holds the foot down.
+/// A foot that is pressed goes down in z at search_speed · (1 − load / press_load) instead, and up
+/// where that is negative, no deeper than a search.
 class Landing {
  public:
   enum class State { kSwing, kSearching, kTouching, kRetracted };
@@ -91,7 +96,8 @@ class Landing {
   /// Once a tick, before the schedule: `load` in N along the sole's normal, and what it is known to
   /// (see LoadLevels).
   void Measure(double time, double load, double deviation = 0);
-  /// Measured contact that has settled: double support may begin.
+  /// Double support may begin: the foot has touched and its load has lasted for `settle`, or it has
+  /// never left the ground.
   bool confirmed() const;
   /// No surface was found, and the foot is up again.
   bool found_none() const { return state_ == State::kRetracted && retreat_.Ended(time_); }
@@ -108,10 +114,12 @@ class Landing {
   void Enter(State state, const PointMotion& reference, const Eigen::Matrix3d& rotation);
   void AdvanceState(bool before_touch_down, bool due, const Eigen::Isometry3d& sole,
                     const PointMotion& reference, const Eigen::Matrix3d& rotation);
-  bool Rises() const { return !lowered_ && time_ < move_end_; }
+  bool Rises() const { return !moves_down_ && time_ < move_end_; }
   bool SearchBegins(bool before_touch_down, bool due) const;
   /// Share of a first-order approach with `time_constant`, s, in this tick.
   double Share(double time_constant) const { return period_ / (time_constant + period_); }
+  /// m, of the reference of a foot that does not retract.
+  double Lowest() const { return end_height_ - spec_.search_depth; }
   void Search();
   void Touch(const Eigen::Isometry3d& sole);
 
@@ -121,11 +129,11 @@ class Landing {
   double time_ = 0, period_ = 0;  // s, of this tick, since the last
   double load_ = 0;               // N
   LoadLevels levels_;
-  double touched_ = 0;     // s, when the touch, or the press' load, began
-  bool left_ = false;      // the ground or surface from which the last move started
-  bool lowered_ = false;   // the last move went down
-  double move_end_ = 0;    // s
-  double end_height_ = 0;  // m, where the scenario's reference ends
+  double touched_ = 0;            // s, when the touch, or the press' load, began
+  bool has_left_ground_ = false;  // the ground or surface from which the last move started
+  bool moves_down_ = false;       // the last move went down
+  double move_end_ = 0;           // s
+  double end_height_ = 0;         // m, where the scenario's reference ends
   PointMotion reference_;
   Eigen::Matrix3d rotation_ = Eigen::Matrix3d::Identity();
   QuinticMove retreat_;

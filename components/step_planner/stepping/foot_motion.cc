@@ -45,7 +45,7 @@ void FootMotion::Move(const Footstep& step, double time) {
 bool FootMotion::Update(const StepInput& input, Foot foot, const robot::FootModel& model) {
   const Eigen::Isometry3d& sole = input.sole[foot];
   const double deviation = input.load_deviation[foot];
-  const bool counts = !(deviation > 0) || input.time >= swing_.end() ||
+  const bool counts = !distrusts_early_load_ || !(deviation > 0) || input.time >= swing_.end() ||
                       LowestCorner(sole, model) < swing_.foothold().z() + kLowSole;
   landing_.Measure(input.time, counts ? input.load[foot] : 0, deviation);
   reference_ = swing_.At(input.time);

@@ -18,7 +18,7 @@ Vector2d Turned(double yaw, const Vector2d& point) { return Eigen::Rotation2Dd(y
 Foothold NextFootstep(const Foothold& stance, Foot foot, const WalkCommand& command, double period,
                       const FootstepLimits& limits) {
   const double side = Side(foot);
-  if (command.period > 0) {
+  if (command.has_footholds()) {
     const Foothold& asked = command.stride[foot];
     const double ahead = std::clamp(asked.position.x(), -limits.longest, limits.longest);
     const double apart =
@@ -72,7 +72,7 @@ Foothold Towards(const Foothold& step, const Foothold& wanted, double most, cons
 WalkCommand Approach(const WalkCommand& from, const WalkCommand& command, double speed,
                      double turn) {
   WalkCommand next = command;
-  if (command.period > 0) return next;
+  if (command.has_footholds()) return next;
   const Vector2d change = command.velocity - from.velocity;
   const double size = change.norm();
   if (size > speed) next.velocity = from.velocity + speed / size * change;

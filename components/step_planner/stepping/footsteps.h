@@ -16,7 +16,7 @@ struct Foothold {
   void Archive(StateArchive* archive) { archive->Show(position, yaw); }
 };
 
-/// What is walked: in axes of the heading.
+/// The walk that is commanded, in axes of the robot's heading.
 struct WalkCommand {
   Eigen::Vector2d velocity = Eigen::Vector2d::Zero();  ///< m/s ahead, to the left
   double turn_rate = 0;                                ///< rad/s, to the left
@@ -26,6 +26,8 @@ struct WalkCommand {
   double period = 0;
   FootArray<Foothold> stride{};
 
+  /// The footholds are given, by the port `stride`; else they follow from the velocity.
+  bool has_footholds() const { return period > 0; }
   bool in_place() const { return velocity.isZero(0) && turn_rate == 0; }
   void Archive(StateArchive* archive) {
     archive->Show(velocity, turn_rate, stepping, period, stride);

@@ -42,7 +42,7 @@ StepState Observe(const StepInput& input, const FootArray<bool>& in_contact, dou
   return state;
 }
 
-void HeightLead::Follow(double wanted, double period) {
+void DampedLead::Follow(double wanted, double period) {
   const double most = kHeightShare * robot::kGravity;
   point_.acceleration = std::clamp(
       rate_ * rate_ * (wanted - point_.position) - 2 * rate_ * point_.velocity, -most, most);

@@ -33,7 +33,7 @@ struct StepInput {
   PointMotion free_foot;                   ///< reference of a foot in the air; likewise
   Eigen::Matrix3d free_rotation = Eigen::Matrix3d::Identity();
   double com_height = 0;     ///< m, world, of the COM's reference; likewise
-  bool step_needed = false;  ///< the capture point has stayed beyond the soles
+  bool step_needed = false;  ///< PLANNER_STATUS.step_needed of the tick before
   bool allowed = true;       ///< a first step may begin
   WalkCommand command;       ///< of a planner that is told to walk
 };
@@ -55,7 +55,7 @@ struct StepStatus {
   StepReason reason = StepReason::kNone;  ///< of the step under way, or the last
   bool under_way = false;                 ///< `step` is planned or under way; else it has landed
   Footstep step;
-  double margin = 0;  ///< StepPlan's
+  double margin = 0;  ///< StepPlan::margin of that step
 };
 
 /// What the plan takes over while steps are made.
@@ -90,11 +90,12 @@ double Yaw(const Eigen::Isometry3d& pose);
 /// since the momentum about the centre of pressure is gravity's alone.
 StepState Observe(const StepInput& input, const FootArray<bool>& in_contact, double momentum = 0);
 
-/// The COM's height, led without haste to where the legs want it.
-class HeightLead {
+/// A number led to a wanted one, critically damped; at most with 0.25 g in its own unit, so that
+/// soles stay loaded below a COM whose height is led.
+class DampedLead {
  public:
   /// `rate`, 1/s: critically damped, two such poles.
-  explicit HeightLead(double rate = 1) : rate_(rate) {}
+  explicit DampedLead(double rate = 1) : rate_(rate) {}
   void Begin(double height) { point_ = {height, 0, 0}; }
   void Follow(double wanted, double period);
   const Quintic::Point& point() const { return point_; }
@@ -108,7 +109,7 @@ class HeightLead {
 /// The body's heading, led without haste to the middle of the soles' headings.
 class BodyHeading {
  public:
-  /// `rate`, 1/s: HeightLead's.
+  /// `rate`, 1/s: DampedLead's.
   explicit BodyHeading(double rate = 1) : turned_(rate) {}
   /// The robot stands and heads along `yaw`, rad.
   void Begin(double yaw) {
@@ -124,7 +125,7 @@ class BodyHeading {
 
  private:
   double start_ = 0;  // rad
-  HeightLead turned_;
+  DampedLead turned_;
 };
 
 /// The foot that steps first: of the side that the robot goes or turns to.

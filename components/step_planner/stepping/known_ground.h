@@ -7,7 +7,8 @@
 
 namespace poise::stepping {
 
-/// What the robot is told of the ground: steps across the way, for a lane each. Empty: nothing.
+/// The ground's height along world x, for each foot, as configured. Empty: it is level or not
+/// known.
 class KnownGround {
  public:
   /// From `from`, m, world x, on the ground under `foot` is `height`, m, world; in order of `from`.

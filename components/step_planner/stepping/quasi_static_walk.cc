@@ -16,7 +16,7 @@ constexpr int kHalvings = 40;  // of [0, 1]
 // m that told ground is higher to be an edge that the foot rises over, and the share of the swing
 // in which it only rises then: on unknown ground 0.15 is enough, told ground is an edge for
 // certain.
-constexpr double kEdgeHeight = 0.03, kEdgeWait = 0.25;
+constexpr double kStepUpHeight = 0.03, kStepUpWait = 0.25;
 // Times the unloading's rate, at least and at most: the ramp goes on however far the centre of
 // pressure is, and comes up with it. A foot that carries nothing and is a contact of the model
 // still was dragged off its place.
@@ -68,9 +68,9 @@ void QuasiStaticWalk::PlanSteps(const Foothold& first, double unload) {
   Footstep step{.foot = Other(stance_), .at = first, .unload = unload};
   steps_.Clear();
   for (int i = 0; i < kPlanned; ++i) {
-    step.lift_off = step.unload + slower_ * spec_.unload;
+    step.lift_off = step.unload + ramp_slowdown_ * spec_.unload;
     step.touch_down = step.lift_off + SwingTime();
-    step.load = step.touch_down + spec_.landing.settle + slower_ * spec_.load;
+    step.load = step.touch_down + spec_.landing.settle + ramp_slowdown_ * spec_.load;
     steps_.Add(step);
     step.unload = step.load;
     step.foot = Other(step.foot);
@@ -88,7 +88,7 @@ Foothold QuasiStaticWalk::NextOnCourse(const Foothold& stance, Foot foot) const 
 }
 
 bool QuasiStaticWalk::LiftsOff(const StepState& state, double time) const {
-  if (time < since_ + slower_ * spec_.unload - kTimeTolerance) return false;
+  if (time < since_ + ramp_slowdown_ * spec_.unload - kTimeTolerance) return false;
   if (unloaded_ < 1) return false;
   const Vector2d off = state.pendulum.capture_point() - state.sole[stance_];
   return off.norm() < spec_.lift_off_distance;
@@ -136,7 +136,7 @@ bool QuasiStaticWalk::Update(const StepInput& input, const WalkCommand& command)
       break;
     }
     case Stage::kLoading:
-      if (time < since_ + slower_ * spec_.load - kTimeTolerance) break;
+      if (time < since_ + ramp_slowdown_ * spec_.load - kTimeTolerance) break;
       moving_since_ = time;
       Enter(steps_.empty() ? Stage::kCatching : Stage::kUnloading, time);
       break;
@@ -160,7 +160,7 @@ void QuasiStaticWalk::Start(const StepInput& input, const StepState& state,
   stance_ = Other(FirstFoot(command));
   in_contact_ = {true, true};
   for (const Foot foot : kFeet) sole_[foot].Touch(input.sole[foot]);
-  slower_ = 1;
+  ramp_slowdown_ = 1;
   double ground = input.sole[0].translation().z();
   if (!spec_.ground.empty()) ground = std::min(ground, input.sole[1].translation().z());
   if (!lowered_) standing_height_ = input.com_height - ground;
@@ -169,9 +169,9 @@ void QuasiStaticWalk::Start(const StepInput& input, const StepState& state,
   heading_.Begin(state.yaw);
   course_ = {state.sole[stance_], state.sole_yaw[stance_]};
   PlanSteps(Next(course_, Other(stance_)), input.time + spec_.start);
-  left_over_.setZero();
+  cop_jump_.setZero();
   offset_.setZero();
-  reckoned_ = state.pendulum.capture_point();
+  predicted_capture_point_ = state.pendulum.capture_point();
   Enter(Stage::kShifting, input.time);
   start_ = {state.pendulum.capture_point(), input.time, spec_.start + spec_.unload};
 }
@@ -180,16 +180,14 @@ void QuasiStaticWalk::BeginSwing(const StepInput& input) {
   const Foot foot = Other(stance_);
   in_contact_[foot] = false;
   starting_ = false;
-  Footstep& step = steps_.first();
-  step.lift_off = input.time;
-  step.touch_down = input.time + SwingTime();
-  step.load = step.touch_down + spec_.landing.settle + slower_ * spec_.load;
+  PlanSteps(steps_.first().at, input.time - ramp_slowdown_ * spec_.unload);
+  const Footstep& step = steps_.first();
   pressed_.Begin(0);
   const double ground = GroundAt(input, step.at);
   SwingSpec way = spec_.foot;
   // Up before an edge that it is told of, not against it.
-  if (!spec_.ground.empty() && ground > input.sole[foot].translation().z() + kEdgeHeight) {
-    way.wait = std::max(way.wait, kEdgeWait);
+  if (!spec_.ground.empty() && ground > input.sole[foot].translation().z() + kStepUpHeight) {
+    way.wait = std::max(way.wait, kStepUpWait);
   }
   // It is searched for as deep below where the stance sole stands as below what that met.
   foot_.LiftOff({.position = input.sole[foot].translation()}, input.sole[foot].linear(), step,
@@ -221,10 +219,10 @@ void QuasiStaticWalk::Land(const StepInput& input, const StepState& state,
   const Foot foot = Other(stance_);
   sole_[foot].Expect(input.sole[foot], input.load[foot], spec_.weight, spec_.most_sinking);
   const double haste = kSinkSpeed * (spec_.load + spec_.unload);
-  slower_ = std::max(sole_[foot].sinks() / haste, 1.0);
+  ramp_slowdown_ = std::max(sole_[foot].sinks() / haste, 1.0);
   course_ = Next(course_, foot);
   stance_ = foot;
-  steps_.Land(input.time, input.time + slower_ * spec_.load);
+  steps_.Land(input.time, input.time + ramp_slowdown_ * spec_.load);
   Enter(Stage::kLoading, input.time);
   command_ = Approach(command_, command, kAcceleration * spec_.period(),
                       spec_.turn_acceleration * spec_.period());
@@ -259,7 +257,8 @@ double QuasiStaticWalk::Progress(double time) const {
   const double past = time - since_;
   if (stage_ == Stage::kUnloading) return unloaded_;
   // From what the press carries.
-  return std::clamp(ramp_start_ + (1 - ramp_start_) * past / (slower_ * spec_.load), 0.0, 1.0);
+  return std::clamp(ramp_start_ + (1 - ramp_start_) * past / (ramp_slowdown_ * spec_.load), 0.0,
+                    1.0);
 }
 
 void QuasiStaticWalk::Unload(const StepState& state, double period) {
@@ -269,7 +268,8 @@ void QuasiStaticWalk::Unload(const StepState& state, double period) {
   const double left = std::max(0.0, (output_.cop - stance).dot(way) / way.squaredNorm());
   const double share =
       spec_.load_lead < left * way.norm() ? spec_.load_lead / (left * way.norm()) : 1;
-  const double step = period / (slower_ * spec_.unload), most = share < 1 ? RampStart(share) : 1;
+  const double step = period / (ramp_slowdown_ * spec_.unload),
+               most = share < 1 ? RampStart(share) : 1;
   unloaded_ = std::min(
       1.0, unloaded_ + std::clamp(most - unloaded_, kSlowestUnload * step, kFastestUnload * step));
 }
@@ -321,9 +321,9 @@ Vector2d QuasiStaticWalk::DesiredCop(const StepInput& input, const StepState& st
       Carrying(input, state, wanted_.Cop(state.pendulum.frequency));
   const Vector2d asked = LeadingCop(state.pendulum, wanted_, kGain, carrying);
   // A foot that lands at another time than planned makes no step of it.
-  if (since_ == time && stage_ != Stage::kShifting) left_over_ = output_.cop - asked;
+  if (since_ == time && stage_ != Stage::kShifting) cop_jump_ = output_.cop - asked;
   const double left = 1 - balance::SmoothStep((time - since_) / kBlend);
-  return balance::NearestPoint(carrying, asked + left * left_over_);
+  return balance::NearestPoint(carrying, asked + left * cop_jump_);
 }
 
 double QuasiStaticWalk::SwingTime() const {
@@ -343,9 +343,10 @@ Vector2d QuasiStaticWalk::WithoutOffset(const StepState& state, const Vector2d& 
   // Two poles at the rate.
   const double rate = kOffsetRate;
   const double w = state.pendulum.frequency;
-  const Vector2d error = state.pendulum.capture_point() - reckoned_;
+  const Vector2d error = state.pendulum.capture_point() - predicted_capture_point_;
   const Vector2d asked = cop - offset_;
-  reckoned_ += period * (w * (reckoned_ + error - asked - offset_) + 2 * rate * error);
+  predicted_capture_point_ +=
+      period * (w * (predicted_capture_point_ + error - asked - offset_) + 2 * rate * error);
   offset_ = (offset_ - period * rate * rate / w * error)
                 .cwiseMax(-spec_.most_offset)
                 .cwiseMin(spec_.most_offset);
@@ -407,9 +408,9 @@ void QuasiStaticWalk::Lead(const StepInput& input, const StepState& state) {
 
 void QuasiStaticWalk::Archive(StateArchive* archive) {
   archive->Show(stage_, command_, stance_, num_steps_, in_contact_, steps_, foot_, height_,
-                heading_, pressed_, sole_, slower_, time_, since_, moving_since_, standing_height_,
-                starting_, course_, unloaded_, lowered_, start_, wanted_, left_over_, reckoned_,
-                offset_, output_);
+                heading_, pressed_, sole_, ramp_slowdown_, time_, since_, moving_since_,
+                standing_height_, starting_, course_, unloaded_, lowered_, start_, wanted_,
+                cop_jump_, predicted_capture_point_, offset_, output_);
 }
 
 }  // namespace poise::stepping

@@ -122,7 +122,7 @@ class QuasiStaticWalk {
   Foothold NextOnCourse(const Foothold& stance, Foot foot) const;
   /// The foot may leave the ground.
   bool LiftsOff(const StepState& state, double time) const;
-  double Transfer() const { return slower_ * (spec_.load + spec_.unload); }  ///< s
+  double Transfer() const { return ramp_slowdown_ * (spec_.load + spec_.unload); }  ///< s
   /// What to ask for so that the capture point moves as of `cop`, m: what legs that swing and a
   /// body that turns add to the pendulum is observed, ξ̇ = ω (ξ − asked − offset), and taken off.
   Eigen::Vector2d WithoutOffset(const StepState& state, const Eigen::Vector2d& cop, double period);
@@ -147,8 +147,6 @@ class QuasiStaticWalk {
 
   // m/s² with which a commanded velocity is approached: a hundredth of g, on any robot.
   static constexpr double kAcceleration = 0.1;
-  // s of contact.touch_load that are a landing: a hard sole bounces as long on any robot.
-  static constexpr double kTouchDuration = 0.002;
   // Ratio: by this share of the capture point's error the centre of pressure goes beyond it, so
   // that the error decays at this times ω.
   static constexpr double kGain = 0.5;
@@ -162,12 +160,12 @@ class QuasiStaticWalk {
   FootArray<bool> in_contact_{true, true};
   ContactPlan steps_;  // empty: no step follows the one that has landed
   FootMotion foot_;
-  HeightLead height_;
+  DampedLead height_;
   BodyHeading heading_;
-  HeightLead pressed_;                              // share that the press carries
+  DampedLead pressed_;                              // share that the press carries
   double time_ = 0, since_ = 0, moving_since_ = 0;  // s: last tick; stage; not at rest
   FootArray<SoleMemory> sole_;
-  double slower_ = 1;           // ratio: the ramps, where the sole sinks
+  double ramp_slowdown_ = 1;    // ratio: the ramps, where the sole sinks
   double unloaded_ = 0;         // of the unloading ramp
   double ramp_start_ = 0;       // of the loading ramp: what the press carries
   double standing_height_ = 0;  // m
@@ -176,9 +174,10 @@ class QuasiStaticWalk {
   Foothold course_;    // where the stance sole would stand if every step came down as commanded
   CaptureMove start_;  // of the capture point while starting
   CaptureReference wanted_;
-  Eigen::Vector2d reckoned_ = Eigen::Vector2d::Zero();   // m, capture point by the pendulum
-  Eigen::Vector2d offset_ = Eigen::Vector2d::Zero();     // m, of the centre of pressure it obeys
-  Eigen::Vector2d left_over_ = Eigen::Vector2d::Zero();  // m, of the last stage's at its end
+  Eigen::Vector2d predicted_capture_point_ =
+      Eigen::Vector2d::Zero();                          // m, capture point by the pendulum
+  Eigen::Vector2d offset_ = Eigen::Vector2d::Zero();    // m, of the centre of pressure it obeys
+  Eigen::Vector2d cop_jump_ = Eigen::Vector2d::Zero();  // m, of the last stage's at its end
   StepOutput output_;
 };
 

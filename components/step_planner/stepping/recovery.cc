@@ -105,7 +105,7 @@ bool Recovery::Update(const StepInput& input) {
     case Stage::kTouching:  // the first load counts
       break;
     case Stage::kLoading:
-      if (StepOn(input, state)) break;
+      if (StepAtLanding(input, state)) break;
       if (time >= steps_.landed().load - kTimeTolerance) {
         stage_ = Stage::kCatching;
         since_ = moving_since_ = time;
@@ -115,7 +115,7 @@ bool Recovery::Update(const StepInput& input) {
       if (command_.stepping) {
         steps_now_ = 0;
         BeginTurning(state);
-        const Vector2d way = state.pendulum.capture_point() - Goal(state);
+        const Vector2d way = state.pendulum.capture_point() - MiddleOfSoles(state);
         // The foot that the capture point is nearer to stays.
         const double left = std::cos(state.yaw) * way.y() - std::sin(state.yaw) * way.x();
         StepReason reason = StepReason::kWalk;
@@ -162,7 +162,12 @@ StepReason Recovery::NeedOfFirstStep(const StepInput& input, const StepState& st
 
 StepStatus Recovery::status() const {
   const bool under_way = !steps_.empty();
-  return {stage_, reason_, under_way, under_way ? steps_.first() : steps_.landed(), plan_.margin};
+  Footstep step = under_way ? steps_.first() : steps_.landed();
+  if (stage_ == Stage::kShifting) {
+    step.foot = plan_.foot;
+    step.at = {plan_.foothold, plan_.yaw};
+  }
+  return {stage_, reason_, under_way, step, plan_.margin};
 }
 
 double Recovery::UnloadTime() const {
@@ -170,7 +175,7 @@ double Recovery::UnloadTime() const {
 }
 
 double Recovery::LoadTime() const {
-  return reason_ == StepReason::kTogether ? kTogetherRamp : kLoad;
+  return reason_ == StepReason::kTogether ? kTogetherRamp : kLoadTime;
 }
 
 bool Recovery::TogetherNow(const StepInput& input, const StepState& state, StepPlan* plan) {
@@ -188,7 +193,7 @@ bool Recovery::TogetherNow(const StepInput& input, const StepState& state, StepP
       together_asked_ = false;
       return false;
     }
-    // Straight rather than around the other leg.
+    // A foot that goes straight rather than one that goes around the other leg.
     if (std::isfinite(beside.margin) && (!plan->possible || !beside.around)) *plan = beside;
   }
   return plan->possible;
@@ -200,7 +205,7 @@ void Recovery::BeginShift(const StepInput& input, const StepState& state) {
   steps_now_ = 0;
   in_contact_ = input.in_contact;
   const bool walks = reason_ == StepReason::kWalk;
-  shift_ = {state.pendulum.capture_point(), input.time, walks ? kSetOff : kTogetherShift};
+  shift_ = {state.pendulum.capture_point(), input.time, walks ? kSetOffTime : kTogetherShift};
   cop_from_ = output_.cop = shift_.from;
   since_ = input.time;
   stage_ = Stage::kShifting;
@@ -245,7 +250,8 @@ bool Recovery::BeginStep(const StepInput& input, const StepPlan& plan, StepReaso
   steps_.Clear();
   steps_.Add(step);
   SetPlan(plan);
-  return in_contact_[plan.foot] || LiftOff(input, input.free_foot, input.free_rotation);
+  if (!in_contact_[plan.foot]) LiftOff(input, input.free_foot, input.free_rotation);
+  return true;
 }
 
 void Recovery::SetPlan(const StepPlan& plan) {
@@ -256,12 +262,12 @@ void Recovery::SetPlan(const StepPlan& plan) {
   step.corner = plan.corner;
 }
 
-bool Recovery::LiftOff(const StepInput& input) {
+void Recovery::LiftOff(const StepInput& input) {
   const Eigen::Isometry3d& sole = input.sole[plan_.foot];
-  return LiftOff(input, {.position = sole.translation()}, sole.linear());
+  LiftOff(input, {.position = sole.translation()}, sole.linear());
 }
 
-bool Recovery::LiftOff(const StepInput& input, const PointMotion& from,
+void Recovery::LiftOff(const StepInput& input, const PointMotion& from,
                        const Eigen::Matrix3d& rotation) {
   in_contact_[plan_.foot] = false;
   steps_.first().lift_off = input.time;
@@ -270,7 +276,6 @@ bool Recovery::LiftOff(const StepInput& input, const PointMotion& from,
   stage_ = Stage::kSwinging;
   since_ = input.time;
   cop_from_ = output_.cop;
-  return true;
 }
 
 void Recovery::Land(const StepInput& input) {
@@ -282,23 +287,26 @@ void Recovery::Land(const StepInput& input) {
   cop_from_ = output_.cop;
 }
 
-bool Recovery::StepOn(const StepInput& input, const StepState& state) {
+bool Recovery::StepAtLanding(const StepInput& input, const StepState& state) {
   if (command_.stepping) steps_now_ = 0;
   if (reason_ == StepReason::kTogether || steps_now_ >= kMostSteps) return false;
   const Foot other = Other(plan_.foot);
   // A foot that has only tapped the ground carries nothing: the robot would fall from the other
   // one.
   if (!(input.load[plan_.foot] > input.load[other])) return false;
+  StepReason reason = command_.stepping ? StepReason::kWalk : StepReason::kAgain;
+  StepPlan next;
   if (command_.stepping) {
-    StepReason reason = StepReason::kWalk;
-    const StepPlan next = WalkOn(state, other, 0, &reason);
-    return BeginStep(input, next, reason) && LiftOff(input);
+    next = WalkOn(state, other, 0, &reason);
+  } else {
+    const double margin =
+        balance::SignedDistance(choice_.Soles(state), state.pendulum.capture_point());
+    if (margin > kStepOnShare * choice_.limits().ample_margin) return false;
+    next = choice_.Next(state, other);
   }
-  const double margin =
-      balance::SignedDistance(choice_.Soles(state), state.pendulum.capture_point());
-  if (margin > kStepOnShare * choice_.limits().ample_margin) return false;
-  const StepPlan next = choice_.Next(state, other);
-  return BeginStep(input, next, StepReason::kAgain) && LiftOff(input);
+  if (!BeginStep(input, next, reason)) return false;
+  LiftOff(input);
+  return true;
 }
 
 void Recovery::Replan(const StepInput& input, const StepState& state) {
@@ -342,7 +350,7 @@ double Recovery::Ramp(double time) const {
   return (time - step.touch_down) / (step.load - step.touch_down);
 }
 
-Vector2d Recovery::Goal(const StepState& state) const {
+Vector2d Recovery::MiddleOfSoles(const StepState& state) const {
   return 0.5 * (state.sole[0] + state.sole[1]);
 }
 
@@ -355,50 +363,50 @@ Vector2d Recovery::ForBody(const StepInput& input, double budget) const {
   return length > budget ? Vector2d(budget / length * offset) : offset;
 }
 
-Vector2d Recovery::PointFor(const StepInput& input, const StepState& state,
-                            const balance::ConvexPolygon& support,
-                            const CaptureReference& reference, double budget) const {
+Vector2d Recovery::CopFor(const StepInput& input, const StepState& state,
+                          const balance::ConvexPolygon& support, const CaptureReference& reference,
+                          double budget) const {
   const bool gently = stage_ == Stage::kShifting || reason_ == StepReason::kTogether;
   const double gain = gently ? std::max(kGain, kTogetherGain) : kGain;
   return LeadingCop(state.pendulum, reference, gain, support, ForBody(input, budget));
 }
 
-Vector2d Recovery::BrakingPoint(const StepInput& input, const StepState& state) const {
+Vector2d Recovery::BrakingCop(const StepInput& input, const StepState& state) const {
   const Foot stance = Other(plan_.foot);
   const balance::ConvexPolygon sole = choice_.Sole(state, stance);
   if (reason_ == StepReason::kTogether) {
-    return PointFor(input, state, sole, {state.sole[stance], Vector2d::Zero()}, kSwingBudget);
+    return CopFor(input, state, sole, {state.sole[stance], Vector2d::Zero()}, kSwingBudget);
   }
   if (reason_ == StepReason::kWalk) {
     const double left = steps_.first().touch_down + gait(state).transfer - input.time;
-    return PointFor(input, state, sole, choice_.StrideReference(state, stance, gait(state), left),
-                    kSwingBudget);
+    return CopFor(input, state, sole, choice_.StrideReference(state, stance, gait(state), left),
+                  kSwingBudget);
   }
   // It only brakes: what is left of the way is the foot's.
   return LeadingCop(state.pendulum, {state.pendulum.capture_point(), Vector2d::Zero()}, 0, sole,
                     ForBody(input, kSwingBudget));
 }
 
-Vector2d Recovery::CatchingPoint(const StepInput& input, const StepState& state) const {
+Vector2d Recovery::CatchingCop(const StepInput& input, const StepState& state) const {
   const balance::ConvexPolygon soles = choice_.Soles(state);
   const bool walks = command_.stepping && reason_ == StepReason::kWalk;
   if (stage_ == Stage::kShifting) {
     const Foot stance = Other(plan_.foot);
     const Vector2d to =
-        walks ? choice_.StrideBegin(state, stance, gait(state)) : state.sole[stance];
-    return PointFor(input, state, soles, shift_.At(input.time, to), kCatchBudget);
+        walks ? choice_.CapturePointAtLiftOff(state, stance, gait(state)) : state.sole[stance];
+    return CopFor(input, state, soles, shift_.At(input.time, to), kCatchBudget);
   }
   if (walks) {
     const CaptureReference stride =
         choice_.StrideReference(state, plan_.foot, gait(state), gait(state).period);
-    return PointFor(input, state, soles, stride, kSwingBudget);
+    return CopFor(input, state, soles, stride, kSwingBudget);
   }
-  return PointFor(input, state, soles, {Goal(state), Vector2d::Zero()}, kCatchBudget);
+  return CopFor(input, state, soles, {MiddleOfSoles(state), Vector2d::Zero()}, kCatchBudget);
 }
 
 bool Recovery::AtRest(const StepInput& input, const StepState& state) {
   const bool slow = input.com_velocity.norm() < kStillSpeed;
-  const bool near = (state.pendulum.capture_point() - Goal(state)).norm() < kStillDistance;
+  const bool near = (state.pendulum.capture_point() - MiddleOfSoles(state)).norm() < kStillDistance;
   if (!slow || !(near || Excess(state) < -kStillDistance)) moving_since_ = input.time;
   return input.time >= moving_since_ + (near ? kStillTime : kStillBesideTime) - kTimeTolerance;
 }
@@ -443,7 +451,7 @@ void Recovery::LeadCom(const StepInput& input, const StepState& state) {
   switch (stage_) {
     case Stage::kUnloading:
     case Stage::kSwinging:
-      cop = BrakingPoint(input, state);
+      cop = BrakingCop(input, state);
       if (stage_ == Stage::kUnloading) {
         share = (Ramp(input.time) - ramp_from_) / (1 - ramp_from_);
       }
@@ -451,7 +459,7 @@ void Recovery::LeadCom(const StepInput& input, const StepState& state) {
     case Stage::kShifting:
     case Stage::kLoading:
     case Stage::kCatching:
-      cop = CatchingPoint(input, state);
+      cop = CatchingCop(input, state);
       if (stage_ == Stage::kLoading) share = Ramp(input.time);
       break;
     case Stage::kStanding:

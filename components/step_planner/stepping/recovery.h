@@ -1,4 +1,4 @@
-// Steps that catch a push: when, which foot, where, and how the COM is led meanwhile.
+// Steps that the capture point leads: when, which foot, where, and how the COM is led meanwhile.
 #pragma once
 
 #include <Eigen/Core>
@@ -27,13 +27,15 @@ struct RecoverySpec {
   double holding_lowering = 0;
 };
 
-/// Pure function of its calls; never allocates.
+/// The steps that catch a push, those of a dynamic walk, and the one that puts the feet side by
+/// side: StepReason says which. Pure function of its calls; never allocates.
 class Recovery {
  public:
-  static constexpr double kLoad = 0.06;  ///< s of the ramp (61) that loads a landed foot
+  /// s of the ramp (61) that loads a landed foot, and leads the centre of pressure onto it.
+  static constexpr double kLoadTime = 0.06;
   /// ωT of a walk's step. Fitted: of 64 runs 56, 57 and 60 stand with 1.1, 1.3 and 1.5; G1 stands
   /// 136 of 192 pushes in a walk with 1.3, 127 with 1.1 and 112 with 1.5.
-  static constexpr double kStride = 1.3;
+  static constexpr double kOmegaStepTime = 1.3;
   /// The sole rises by 3 cm. It meets the ground with 0.25 m/s: sooner down is a larger push,
   /// harder a bounce. The foothold stays for the last 0.05 s: a move within less would jerk the
   /// leg.
@@ -74,23 +76,25 @@ class Recovery {
   StepReason NeedOfFirstStep(const StepInput& input, const StepState& state, double excess);
   /// False, and no effect: no foot can make this step.
   bool BeginStep(const StepInput& input, const StepPlan& plan, StepReason reason);
-  /// True: the plan's foot leaves, from the motion `from` and turned by `rotation`, or from where
-  /// its sole stands.
-  bool LiftOff(const StepInput& input, const PointMotion& from, const Eigen::Matrix3d& rotation);
-  bool LiftOff(const StepInput& input);
+  /// The plan's foot leaves: from the motion `from` and turned by `rotation`, or from where its
+  /// sole stands.
+  void LiftOff(const StepInput& input, const PointMotion& from, const Eigen::Matrix3d& rotation);
+  void LiftOff(const StepInput& input);
   /// The foothold where the capture point now says.
   void Replan(const StepInput& input, const StepState& state);
   void Land(const StepInput& input);
-  /// The other foot leaves as soon as the one that has landed carries more, until the capture point
-  /// is well inside the soles. True: it does.
-  bool StepOn(const StepInput& input, const StepState& state);
+  /// While the landed foot is loaded. True: the other foot leaves, since the landed one carries
+  /// more and a walk goes on, or the capture point is not well inside the soles.
+  bool StepAtLanding(const StepInput& input, const StepState& state);
   bool AtRest(const StepInput& input, const StepState& state);
   /// What the body's return to upright takes of the centre of pressure, m, at most `budget`.
   Eigen::Vector2d ForBody(const StepInput& input, double budget) const;
-  /// Where the COM's share of the centre of pressure shall be on the stance sole, and on both.
-  Eigen::Vector2d BrakingPoint(const StepInput& input, const StepState& state) const;
-  Eigen::Vector2d CatchingPoint(const StepInput& input, const StepState& state) const;
-  Eigen::Vector2d Goal(const StepState& state) const;
+  /// The centre of pressure wanted on the stance sole while a foot is unloaded or swings, and on
+  /// both soles else.
+  Eigen::Vector2d BrakingCop(const StepInput& input, const StepState& state) const;
+  Eigen::Vector2d CatchingCop(const StepInput& input, const StepState& state) const;
+  /// m, world: where the capture point comes to rest.
+  Eigen::Vector2d MiddleOfSoles(const StepState& state) const;
   /// The gait of the command, which is corrected by what the last strides came to.
   Gait gait(const StepState& state) const;
   /// The step of a walk, or of a recovery where the walk's misses its place.
@@ -113,9 +117,9 @@ class Recovery {
   void Shift(const StepInput& input, const StepState& state, double excess);
   /// The centre of pressure on `support` that leads the capture point along `reference`, with the
   /// return of the body to upright, which takes `budget`, m, of it at most.
-  Eigen::Vector2d PointFor(const StepInput& input, const StepState& state,
-                           const balance::ConvexPolygon& support, const CaptureReference& reference,
-                           double budget) const;
+  Eigen::Vector2d CopFor(const StepInput& input, const StepState& state,
+                         const balance::ConvexPolygon& support, const CaptureReference& reference,
+                         double budget) const;
   double UnloadTime() const;
   double LoadTime() const;
   /// Share of the ramp under way, unloading or loading, that has passed at `time`, s.
@@ -129,18 +133,18 @@ class Recovery {
   double LoweringShare(const StepState& state) const;
 
   // Ratio: by this share of the capture point's error the centre of pressure goes beyond it, so
-  // that the error decays at this times ω.
+  // that the error decays at this times ω. More asks soles for what they cannot give.
   static constexpr double kGain = 0.4;
   // 1/s with which the COM's height goes where the legs ask for it, and the body's heading where
-  // the feet's is.
+  // the feet's is: within a step, and no faster than legs follow.
   static constexpr double kHeightRate = 8, kYawRate = 6;
   // m/s², a share of g, with which a commanded velocity is approached, and rad/s², a turn rate:
   // some steps to full speed, each within reach.
   static constexpr double kAcceleration = 0.05 * robot::kGravity, kTurnAcceleration = 1;
   // s in which a walk that begins brings the capture point to where its first step starts.
-  static constexpr double kSetOff = 0.5;
-  // m beyond the soles from which on a capture point asks for a step that is under way already, or
-  // about to be: it is no noise.
+  static constexpr double kSetOffTime = 0.5;
+  // m of the capture point outside the soles that turns a walk's first shift, or the step that puts
+  // the feet side by side, into a recovery's step.
   static constexpr double kLeastExcess = 0.02;
   // m of centre of pressure, at most, for the return of the body to upright while a foot swings.
   static constexpr double kSwingBudget = 0.02;
@@ -166,7 +170,7 @@ class Recovery {
   bool together_asked_ = false;
   CaptureMove shift_;               // of the capture point from rest
   double standing_height_ = 0;      // m, above the soles, before the first step
-  HeightLead height_{kHeightRate};  // m, world, of the COM's reference
+  DampedLead height_{kHeightRate};  // m, world, of the COM's reference
   WalkCommand command_;
   StrideCorrection stride_;
   BodyHeading heading_{kYawRate};

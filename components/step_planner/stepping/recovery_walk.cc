@@ -12,7 +12,7 @@ using Eigen::Vector2d;
 constexpr double kMostMissed = 0.05;
 // ωT of a step that another planner asks for, at most: what the capture point is off by has grown
 // 20 times then.
-constexpr double kLongestStride = 3;
+constexpr double kMostOmegaStepTime = 3;
 // Share of the standing height by which a push must have moved a walk's foothold for the step to
 // tell nothing of undisturbed ones.
 constexpr double kMoved = 0.08;
@@ -20,14 +20,14 @@ constexpr double kMoved = 0.08;
 }  // namespace
 
 Gait Recovery::gait(const StepState& state) const {
-  const double transfer = 0.5 * kLoad;
-  if (command_.period > 0) {
+  const double transfer = 0.5 * kLoadTime;
+  if (command_.has_footholds()) {
     const StepLimits& limits = choice_.limits();
     const double least = limits.unload + limits.least_swing + transfer;
-    const double most = std::max(least, kLongestStride / state.pendulum.frequency);
+    const double most = std::max(least, kMostOmegaStepTime / state.pendulum.frequency);
     return {command_, std::clamp(command_.period, least, most), transfer, kGain};
   }
-  return {stride_.Corrected(command_), kStride / state.pendulum.frequency, transfer, kGain};
+  return {stride_.Corrected(command_), kOmegaStepTime / state.pendulum.frequency, transfer, kGain};
 }
 
 StepPlan Recovery::WalkOn(const StepState& state, Foot foot, double unload,
@@ -70,7 +70,7 @@ void Recovery::ShiftToStride(const StepInput& input, const StepState& state, dou
     stage_ = Stage::kCatching;
     since_ = moving_since_ = input.time;
     cop_from_ = output_.cop;
-  } else if (input.time >= since_ + kSetOff - kTimeTolerance) {
+  } else if (input.time >= since_ + kSetOffTime - kTimeTolerance) {
     StepReason reason = StepReason::kWalk;
     const StepPlan plan = WalkOn(state, plan_.foot, choice_.limits().unload, &reason);
     BeginStep(input, plan, reason);
@@ -78,7 +78,7 @@ void Recovery::ShiftToStride(const StepInput& input, const StepState& state, dou
 }
 
 void Recovery::CountStride(const StepInput& input) {
-  if (!command_.stepping || command_.period > 0 || reason_ != StepReason::kWalk ||
+  if (!command_.stepping || command_.has_footholds() || reason_ != StepReason::kWalk ||
       plan_.moved > kMoved * standing_height_) {
     stride_.Forget();
     return;

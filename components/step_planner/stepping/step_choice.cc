@@ -49,7 +49,7 @@ bool IsFree(const Vector2d& from, const Vector2d& to, const Vector2d& half) {
 }  // namespace
 
 void StepPlan::Archive(StateArchive* archive) {
-  archive->Show(possible, foot, time, foothold, yaw, cop, capture_point, com, margin, follows,
+  archive->Show(possible, foot, time, foothold, yaw, cop, capture_point, com, margin, leg_margin,
                 missed, moved, crossing, around, corner);
 }
 
@@ -57,7 +57,7 @@ double SwingTime(double distance, double acceleration) {
   return std::sqrt(kQuinticAcceleration * distance / acceleration);
 }
 
-Vector2d StepChoice::BrakingPoint(const StepState& state, Foot stance) const {
+Vector2d StepChoice::BrakingCop(const StepState& state, Foot stance) const {
   return balance::NearestPoint(Sole(state, stance), state.pendulum.capture_point());
 }
 
@@ -132,7 +132,7 @@ StepPlan StepChoice::Until(const StepState& state, Foot foot, double time,
 
 StepPlan StepChoice::At(const StepState& state, Foot foot, double time, Crossing crossing) const {
   const Foot s = Other(foot);
-  StepPlan plan = Until(state, foot, time, BrakingPoint(state, s));
+  StepPlan plan = Until(state, foot, time, BrakingCop(state, s));
   plan.crossing = crossing;
   // From here on in axes of the heading, from the stance sole.
   const Eigen::Matrix2d turn = Eigen::Rotation2Dd(state.yaw).toRotationMatrix();
@@ -170,7 +170,7 @@ void StepChoice::PutDown(const StepState& state, const Vector2d& wanted, StepPla
     return turn.transpose() * (point - state.sole[s]);
   };
   const Vector2d com = local(plan->com);
-  plan->follows = balance::SignedDistance(reach_.Leg(stance, 1), Vector2d(-com));
+  plan->leg_margin = balance::SignedDistance(reach_.Leg(stance, 1), Vector2d(-com));
   const balance::ConvexPolygon footholds = reach_.Footholds(foot, com, crossing);
   Vector2d foothold(0, Side(foot) * limits_.spacing);
   bool reached = footholds.num_corners > 0;
@@ -189,7 +189,7 @@ void StepChoice::PutDown(const StepState& state, const Vector2d& wanted, StepPla
       HullOf(Sole(state, s), SoleAt(feet_[foot], limits_.sole_margin, plan->foothold, plan->yaw));
   plan->margin = balance::SignedDistance(soles, plan->capture_point);
   // A COM that the stance leg cannot follow is as bad as a capture point outside.
-  plan->margin = std::min(plan->margin, plan->margin + plan->follows);
+  plan->margin = std::min(plan->margin, plan->margin + plan->leg_margin);
   if (!reached) plan->margin = -std::numeric_limits<double>::infinity();
 }
 
@@ -198,7 +198,8 @@ FootstepLimits StepChoice::StrideLimits() const {
           limits_.most_turn};
 }
 
-Vector2d StepChoice::StrideBegin(const StepState& state, Foot stance, const Gait& gait) const {
+Vector2d StepChoice::CapturePointAtLiftOff(const StepState& state, Foot stance,
+                                           const Gait& gait) const {
   const auto stride =
       NominalStride({state.sole[stance], state.sole_yaw[stance]}, Other(stance), gait.command,
                     gait.period, state.pendulum.frequency, StrideLimits());
@@ -301,7 +302,7 @@ StepPlan StepChoice::Beside(const StepState& state, Foot foot, double time) cons
 bool StepChoice::Helps(const StepState& state, const StepPlan& plan) const {
   if (plan.margin >= 0) return true;
   // The stance sole would leave the ground before the foot comes down.
-  if (plan.follows < 0) return false;
+  if (plan.leg_margin < 0) return false;
   const balance::ConvexPolygon soles = Soles(state);
   const Vector2d now = state.pendulum.capture_point();
   const Vector2d stays = CapturePointAfter(now, balance::NearestPoint(soles, now),
@@ -311,7 +312,7 @@ bool StepChoice::Helps(const StepState& state, const StepPlan& plan) const {
 
 double StepChoice::CostAfter(const StepState& state, const StepPlan& plan, int more) const {
   const double outside =
-      std::max(0.0, limits_.ample_margin - plan.margin) + std::max(0.0, -plan.follows);
+      std::max(0.0, limits_.ample_margin - plan.margin) + std::max(0.0, -plan.leg_margin);
   double cost = outside;
   if (more == 0 || outside == 0) return cost;
   StepState next = state;

@@ -49,11 +49,11 @@ struct StepPlan {
   Eigen::Vector2d cop = Eigen::Vector2d::Zero();            ///< centre of pressure until then
   Eigen::Vector2d capture_point = Eigen::Vector2d::Zero();  ///< at touch-down
   Eigen::Vector2d com = Eigen::Vector2d::Zero();            ///< at touch-down
-  /// m, of the capture point at touch-down inside the soles less `sole_margin`; negative: outside,
-  /// another step must follow; −∞: no foot can get there.
+  /// m from the capture point at touch-down to the edge of the new support less `sole_margin`,
+  /// positive inside; negative: another step must follow; −∞: no foot can get there.
   double margin = 0;
-  /// m, of the COM at touch-down inside the stance leg's reach; negative: the leg cannot follow.
-  double follows = 0;
+  /// m from the COM at touch-down to the edge of the stance leg's reach, positive inside.
+  double leg_margin = 0;
   double missed = 0;  ///< m from where the foot was wanted to the foothold
   double moved = 0;   ///< m from the foothold of the undisturbed gait; of a walk's step
   Crossing crossing = Crossing::kNone;
@@ -106,7 +106,8 @@ class StepChoice {
   /// swing takes longer. `unload`: s, until the foot leaves the ground.
   StepPlan Stride(const StepState& state, Foot foot, const Gait& gait, double unload) const;
   /// m, world: the capture point as the other foot leaves the ground.
-  Eigen::Vector2d StrideBegin(const StepState& state, Foot stance, const Gait& gait) const;
+  Eigen::Vector2d CapturePointAtLiftOff(const StepState& state, Foot stance,
+                                        const Gait& gait) const;
   /// Where the gait has the capture point on the sole of `stance` with `left` s until the other one
   /// carries: that sole's middle, as the centre of pressure, takes it there in time.
   CaptureReference StrideReference(const StepState& state, Foot stance, const Gait& gait,
@@ -127,7 +128,7 @@ class StepChoice {
     return Soles(state, limits_.sole_margin);
   }
   /// The stance sole's point nearest to the capture point, less `sole_margin`.
-  Eigen::Vector2d BrakingPoint(const StepState& state, Foot stance) const;
+  Eigen::Vector2d BrakingCop(const StepState& state, Foot stance) const;
   const StepLimits& limits() const { return limits_; }
   const Reach& reach() const { return reach_; }
   const Legs& legs() const { return legs_; }  ///< of a robot that has a reach

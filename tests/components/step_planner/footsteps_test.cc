@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "components/balance/minimum_jerk.h"
-#include "components/step_planner/stepping/sole_memory.h"
 #include "components/step_planner/stepping/quasi_static_walk.h"
+#include "components/step_planner/stepping/sole_memory.h"
 #include "components/step_planner/stepping/stride_correction.h"
 #include "tests/robot/robot_test_support.h"
 

@@ -344,5 +344,47 @@ TEST(Landing, ASwingLeavesBehindWhatItMeetsOnItsWayUp) {
   }
 }
 
+// A foot of a walk whose leg cannot press: neither the press nor the search goes on for ever.
+TEST(Landing, APressGoesNoDeeperThanASearch) {
+  LandingSpec spec = Shipped();
+  spec.presses = true;
+  spec.retracts = false;
+  Landing landing(spec);
+  PointMotion reference;
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  landing.BeginSwing(0, 0);
+  const auto run = [&](double load, int from, int to) {
+    for (int tick = from; tick < to; ++tick) {
+      landing.Measure(kTick * tick, load);
+      reference = {};
+      landing.Update(true, true, Eigen::Isometry3d::Identity(), &reference, &rotation);
+    }
+  };
+  run(11, 0, 10000);  // above touch, below 0.8 of the press
+  EXPECT_EQ(landing.state(), State::kTouching);
+  EXPECT_FALSE(landing.confirmed());
+  EXPECT_NEAR(reference.position.z(), -spec.search_depth, 1e-9);
+  run(0, 10000, 20000);
+  EXPECT_EQ(landing.state(), State::kSearching);
+  EXPECT_NEAR(reference.position.z(), -spec.search_depth, 1e-9);
+  run(25, 20000, 20500);
+  EXPECT_TRUE(landing.confirmed());
+}
+
+// An observed load is a touch only above three of its standard deviations.
+TEST(Landing, AnObservedLoadMustBeMoreThanItsNoise) {
+  for (const double deviation : {0.0, 20.0}) {
+    Landing landing(Shipped());
+    PointMotion reference;
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+    landing.BeginSwing(0, 0);
+    for (int tick = 0; tick < 100; ++tick) {
+      landing.Measure(kTick * tick, 50, deviation);
+      landing.Update(true, false, Eigen::Isometry3d::Identity(), &reference, &rotation);
+    }
+    EXPECT_EQ(landing.state(), deviation > 0 ? State::kSwing : State::kTouching);
+  }
+}
+
 }  // namespace
 }  // namespace poise

@@ -26,10 +26,10 @@ PhaseSchedule Schedule(const std::string& phases) {
 }
 
 const ScheduleState& Advance(PhaseSchedule* schedule, double time,
-                             const std::array<bool, 2>& com_over_foot,
+                             const std::array<bool, 2>& can_carry_alone,
                              const std::array<bool, 2>& foot_confirmed) {
   return schedule->Advance(
-      {.time = time, .com_over_foot = com_over_foot, .foot_confirmed = foot_confirmed});
+      {.time = time, .can_carry_alone = can_carry_alone, .foot_confirmed = foot_confirmed});
 }
 
 // Section 7.4, then back: unload the left foot in 0.5-1.0 s, stand on the right, load it again
@@ -227,7 +227,7 @@ constexpr int kDown = 0, kStand = 1, kAside = 2, kGiveUp = 3, kLetGo = 4;
 
 TEST(PhaseOutcomes, AFootThatFindsNoSurfaceGoesElsewhereAndTriesAgain) {
   PhaseSchedule schedule = Schedule(kWayOut);
-  ScheduleInput input{.com_over_foot = kOverBoth};
+  ScheduleInput input{.can_carry_alone = kOverBoth};
   const auto run_to = [&](double time) -> const ScheduleState& {
     while (input.time < time - 1e-9) {
       input.time += kTick;
@@ -281,7 +281,7 @@ TEST(PhaseOutcomes, EachPhaseWaitsForItsOwnTime) {
 
 TEST(PhaseOutcomes, OfTheFootThatIsNamed) {
   PhaseSchedule schedule = Schedule(kWayOut);
-  ScheduleInput input{.com_over_foot = kOverBoth};
+  ScheduleInput input{.can_carry_alone = kOverBoth};
   schedule.Advance(input);
   input.time = 0.1;
   input.contact_lost = {false, true};  // names no phase
@@ -301,7 +301,7 @@ TEST(PhaseOutcomes, ChangeNothingWhereNoPhaseFollows) {
   PhaseSchedule schedule = Schedule(kThere);
   for (int tick = 0; tick < 1500; ++tick) {
     const ScheduleState& state = schedule.Advance({.time = kTick * tick,
-                                                   .com_over_foot = kOverBoth,
+                                                   .can_carry_alone = kOverBoth,
                                                    .foot_confirmed = kConfirmed,
                                                    .contact_lost = {true, true},
                                                    .no_surface = true});

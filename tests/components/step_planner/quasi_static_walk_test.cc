@@ -213,15 +213,10 @@ TEST(QuasiStaticWalk, LooksForTheGroundWhereTheSunkSoleMetIt) {
       ASSERT_TRUE(world.RunTo(Stage::kTouching, command));
       EXPECT_NEAR(world.time(), due, 0.02);
     } else {
-      double lowest = 0;
-      while (world.time() < due + 6) {
-        world.Run(kPeriod, command);
-        lowest = std::min(lowest, world.walk().output().swing.position.z());
-      }
-      EXPECT_NEAR(lowest, -kSunk - world.spec().landing.search_depth, 1e-3);
-      // It is up again, and stays there.
-      EXPECT_EQ(world.walk().output().foot_state, Landing::State::kRetracted);
-      EXPECT_GT(world.walk().output().swing.position.z(), lowest + 0.04);
+      world.Run(6, command);
+      EXPECT_NEAR(world.walk().output().swing.position.z(),
+                  -kSunk - world.spec().landing.search_depth, 1e-3);
+      EXPECT_EQ(world.walk().output().foot_state, Landing::State::kSearching);
     }
   }
 }

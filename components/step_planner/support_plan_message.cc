@@ -1,4 +1,4 @@
-#include "components/step_planner/support_order.h"
+#include "components/step_planner/support_plan_message.h"
 
 #include "components/messages/conversions.h"
 #include "components/messages/motion.h"
@@ -21,7 +21,7 @@ int8_t TransitionCode(TransitionKind kind) {
   return support_plan_t::TRANSITION_NONE;
 }
 
-void OrderTransition(const SupportView& view, support_plan_t* plan) {
+void FillTransition(const SupportView& view, support_plan_t* plan) {
   support_plan_t& out = *plan;
   if (view.held) {
     const stepping::StepOutput* steps = view.steps;
@@ -42,12 +42,12 @@ void OrderTransition(const SupportView& view, support_plan_t* plan) {
 
 }  // namespace
 
-void OrderSupport(const SupportView& view, const EstimatedPose& estimate,
-                  const References& references, support_plan_t* plan) {
+void FillSupportPlan(const SupportView& view, const EstimatedPose& estimate,
+                     const References& references, support_plan_t* plan) {
   support_plan_t& out = *plan;
   const bool controlled = !view.schedule.phase().gravity_compensation();
   out.gravity_compensation = controlled ? 0 : 1;
-  OrderTransition(view, plan);
+  FillTransition(view, plan);
   SetMotion(controlled ? references.com : PointMotion{.position = estimate.com},
             &out.com_reference);
   const stepping::StepOutput* const steps = controlled ? view.steps : nullptr;

@@ -20,7 +20,7 @@ struct SupportView {
 
 /// All but the status: contacts, transition and references; the robot as it is while it has no task
 /// but gravity.
-void OrderSupport(const SupportView& view, const EstimatedPose& estimate,
-                  const References& references, support_plan_t* plan);
+void FillSupportPlan(const SupportView& view, const EstimatedPose& estimate,
+                     const References& references, support_plan_t* plan);
 
 }  // namespace poise
