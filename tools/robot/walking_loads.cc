@@ -47,9 +47,9 @@ class Step {
         nominal_(stance.joint_position) {}
 
   /// s. The other foot leaves as the landed one has half of the load.
-  double both() const { return 0.5 * stepping::Recovery::kLoad; }
+  double both() const { return 0.5 * stepping::Recovery::kLoadTime; }
   double single() const {
-    return stepping::Recovery::kStride *
+    return stepping::Recovery::kOmegaStepTime *
                std::sqrt((height_ - spec_.walk_lowering) / robot::kGravity) -
            both();
   }
