@@ -63,36 +63,9 @@ bool Recovery::Update(const StepInput& input) {
   const double period = TickPeriod(time - time_);
   command_ = Approach(command_, input.command, period * kAcceleration, period * kTurnAcceleration);
   switch (stage_) {
-    case Stage::kStanding: {
-      turns_ = false;
-      const StepReason need = NeedOfFirstStep(input, state, excess);
-      if (need == StepReason::kNone && command_.stepping && input.allowed && input.in_contact[0] &&
-          input.in_contact[1]) {
-        SetOff(input, state);
-        break;
-      }
-      if (StepPlan plan; need == StepReason::kNone && TogetherNow(input, state, &plan)) {
-        together_asked_ = false;
-        plan_ = plan;
-        reason_ = StepReason::kTogether;
-        BeginShift(input, state);
-      }
-      step_helps_ = true;
-      if (spec_.watched_margin >= 0 && stage_ == Stage::kStanding &&
-          excess > -spec_.watched_margin) {
-        const StepPlan plan = choice_.Choose(state);
-        step_helps_ = plan.possible && choice_.Helps(state, plan);
-      }
-      if (need == StepReason::kNone) break;
-      const Foot stance = state.in_contact[Foot::kRight] ? Foot::kRight : Foot::kLeft;
-      standing_height_ = input.com_height - input.sole[stance].translation().z();
-      height_.Begin(input.com_height);
-      steps_now_ = 0;
-      in_contact_ = input.in_contact;
-      output_.cop = balance::NearestPoint(choice_.Soles(state), state.pendulum.capture_point());
-      BeginStep(input, choice_.Choose(state), need);
+    case Stage::kStanding:
+      Stand(input, state, excess);
       break;
-    }
     case Stage::kShifting:
       Shift(input, state, excess);
       break;
@@ -112,24 +85,7 @@ bool Recovery::Update(const StepInput& input) {
       }
       break;
     case Stage::kCatching:
-      if (command_.stepping) {
-        steps_now_ = 0;
-        BeginTurning(state);
-        const Vector2d way = state.pendulum.capture_point() - MiddleOfSoles(state);
-        // The foot that the capture point is nearer to stays.
-        const double left = std::cos(state.yaw) * way.y() - std::sin(state.yaw) * way.x();
-        StepReason reason = StepReason::kWalk;
-        const StepPlan plan =
-            WalkOn(state, left > 0 ? Foot::kRight : Foot::kLeft, choice_.limits().unload, &reason);
-        BeginStep(input, plan, reason);
-      } else if (stays_outside_ && steps_now_ < kMostSteps) {
-        BeginStep(input, choice_.Choose(state), StepReason::kAgain);
-      } else if (AtRest(input, state)) {
-        stage_ = Stage::kStanding;
-        const bool caught = reason_ != StepReason::kTogether;
-        // A walk ends with the feet side by side.
-        if (caught && turns_) together_asked_ = true;
-      }
+      Catch(input, state);
       break;
   }
   if (stage_ == Stage::kStanding) {
@@ -146,6 +102,56 @@ bool Recovery::Update(const StepInput& input) {
   output_.progress = output_.transition == 0 ? 0 : std::clamp(Ramp(time), 0.0, 1.0);
   time_ = time;
   return true;
+}
+
+void Recovery::Stand(const StepInput& input, const StepState& state, double excess) {
+  turns_ = false;
+  const StepReason need = NeedOfFirstStep(input, state, excess);
+  if (need == StepReason::kNone && command_.stepping && input.allowed && input.in_contact[0] &&
+      input.in_contact[1]) {
+    SetOff(input, state);
+    return;
+  }
+  if (StepPlan plan; need == StepReason::kNone && TogetherNow(input, state, &plan)) {
+    together_asked_ = false;
+    plan_ = plan;
+    reason_ = StepReason::kTogether;
+    BeginShift(input, state);
+  }
+  step_helps_ = true;
+  if (spec_.watched_margin >= 0 && stage_ == Stage::kStanding && excess > -spec_.watched_margin) {
+    const StepPlan plan = choice_.Choose(state);
+    step_helps_ = plan.possible && choice_.Helps(state, plan);
+  }
+  if (need == StepReason::kNone) return;
+  const Foot stance = state.in_contact[Foot::kRight] ? Foot::kRight : Foot::kLeft;
+  standing_height_ = input.com_height - input.sole[stance].translation().z();
+  height_.Begin(input.com_height);
+  steps_now_ = 0;
+  in_contact_ = input.in_contact;
+  output_.cop = balance::NearestPoint(choice_.Soles(state), state.pendulum.capture_point());
+  BeginStep(input, choice_.Choose(state), need);
+}
+
+void Recovery::Catch(const StepInput& input, const StepState& state) {
+  if (command_.stepping) {
+    steps_now_ = 0;
+    BeginTurning(state);
+    const Vector2d way = state.pendulum.capture_point() - MiddleOfSoles(state);
+    // The foot that the capture point is nearer to stays.
+    const double left = std::cos(state.yaw) * way.y() - std::sin(state.yaw) * way.x();
+    StepReason reason = StepReason::kWalk;
+    const StepPlan plan =
+        WalkOn(state, left > 0 ? Foot::kRight : Foot::kLeft, choice_.limits().unload, &reason);
+    BeginStep(input, plan, reason);
+  } else if (stays_outside_ && steps_now_ < kMostSteps) {
+    BeginStep(input, choice_.Choose(state), StepReason::kAgain);
+  } else if (AtRest(input, state)) {
+    stage_ = Stage::kStanding;
+    const bool caught = reason_ != StepReason::kTogether;
+    // A walk ends with the feet side by side.
+    if (caught && turns_) together_asked_ = true;
+  }
 }
 
 StepReason Recovery::NeedOfFirstStep(const StepInput& input, const StepState& state,

@@ -73,6 +73,10 @@ class Recovery {
   double Excess(const StepState& state) const;
   /// Keeps the times of what has to last. `excess`: m.
   void Watch(double time, double excess);
+  /// The tick of a robot that stands: whether a step, a walk or feet side by side begin.
+  void Stand(const StepInput& input, const StepState& state, double excess);
+  /// The tick on both feet after a step: whether another one begins, or the COM rests.
+  void Catch(const StepInput& input, const StepState& state);
   StepReason NeedOfFirstStep(const StepInput& input, const StepState& state, double excess);
   /// False, and no effect: no foot can make this step.
   bool BeginStep(const StepInput& input, const StepPlan& plan, StepReason reason);
