@@ -67,7 +67,10 @@ constexpr Needs kNeeds[] = {
      "JOINT_COMMAND.in_contact, foot_wrench, margins; ROBOT_SENSORS.foot_wrench | "
      "ROBOT_STATE.foot_wrench"},
     {"*foot_*_computed_max", "JOINT_COMMAND.in_contact, foot_wrench, margins"},
-    {"foot_force_error_*",
+    {"foot_force_error_internal_rms",
+     "JOINT_COMMAND.in_contact, foot_wrench, margins; ROBOT_SENSORS.foot_wrench | "
+     "ROBOT_STATE.foot_wrench; SUPPORT_PLAN.in_contact; PLANNER_STATUS.foot_pose"},
+    {"foot_force_error_resultant_rms",
      "JOINT_COMMAND.in_contact, foot_wrench, margins; ROBOT_SENSORS.foot_wrench | "
      "ROBOT_STATE.foot_wrench; SUPPORT_PLAN.in_contact; PLANNER_STATUS.foot_pose"},
     {"*foot_*_error_*rms",

@@ -48,10 +48,11 @@ bool FootMotion::Update(const StepInput& input, Foot foot, const robot::FootMode
   const bool counts = !distrusts_early_load_ || !(deviation > 0) || input.time >= swing_.end() ||
                       LowestCorner(sole, model) < swing_.foothold().z() + kLowSole;
   landing_.Measure(input.time, counts ? input.load[foot] : 0, deviation);
-  reference_ = swing_.At(input.time);
-  rotation_ = swing_.RotationAt(input.time);
   // What has touched looks for the ground from where it is, should it lose it.
   const bool due = input.time > swing_.end() || landing_.state() != Landing::State::kSwing;
+  // A search goes on from where the last tick has left the foot.
+  if (!due) reference_ = swing_.At(input.time);
+  rotation_ = swing_.RotationAt(input.time);
   Eigen::Matrix3d turn = rotation_.rotation;
   if (landing_.Update(true, due, sole, &reference_, &turn)) rotation_ = {.rotation = turn};
   return landing_.confirmed();

@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
+#include <string>
 
 #include "components/framework/configuration/configuration.h"
 #include "tests/graph/current_folder.h"
@@ -192,11 +194,11 @@ TEST_F(ScenarioPlaceTest, AGraphForARealRobotIsBalanceWithoutItsSimulator) {
 
 TEST_F(ScenarioPlaceTest, AFileIsCheckedAsWhatItsHeaderSays) {
   std::string graph = ReadFile((kDeploy / "graphs/balance.pbtxt").string());
-  size_t at = 0;
-  for (int line = 1; line < 20; ++line) at = graph.find('\n', at) + 1;
+  const size_t at = graph.find("channel {");
+  const auto line = 1 + std::count(graph.begin(), graph.begin() + static_cast<ptrdiff_t>(at), '\n');
   graph[graph.find('{', at)] = '[';
   Write("own/broken.pbtxt", graph);
-  ExpectUsageError({"graph", "check", "own/broken.pbtxt"}, {Full("own/broken.pbtxt") + ":20:"});
+  ExpectUsageError({"graph", "check", "own/broken.pbtxt"}, {Full("own/broken.pbtxt") + ":" + std::to_string(line) + ":"});
 }
 
 TEST_F(ScenarioPlaceTest, AGraphMayHaveItsScenariosName) {
