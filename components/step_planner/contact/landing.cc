@@ -125,7 +125,8 @@ void Landing::AdvanceState(bool before_touch_down, bool due, const Eigen::Isomet
       break;
     }
     case State::kTouching:
-      if (!touching) state_ = searches ? State::kSearching : State::kSwing;
+      // A press searches, too: it goes down while nothing carries.
+      if (!touching && !spec_.presses) state_ = searches ? State::kSearching : State::kSwing;
       break;
     case State::kRetracted:
       break;
