@@ -101,7 +101,7 @@ void FootstepReport::Update(const FootstepInput& input, const stepping::Recovery
     seen.left = out->touch_down[0];
     // A walk is counted on where it is planned.
     if (!walks && recovery->stage() == Stage::kSwinging) {
-      const double metre = stepping::SwingTime(1, recovery->choice().limits().acceleration);
+      const double metre = stepping::LeastSwingTime(1, recovery->choice().limits().acceleration);
       seen.movable = seen.left * seen.left / (metre * metre);
     }
   }

@@ -6,15 +6,16 @@
 #include "components/framework/state_archive.h"
 #include "components/step_planner/phase_graph.h"
 #include "components/step_planner/step_planner.pb.h"
+#include "components/step_planner/stepping/contact_plan.h"
 
 namespace poise {
 
-enum class TransitionKind { kNone, kUnloading, kLoading };
+using stepping::TransitionKind;
 
 /// What holds a phase back.
 enum class WaitingFor {
   kNothing,
-  kCom,      ///< to stand above the stance sole, before unloading or lift-off
+  kCom,      ///< for the capture point above the stance sole, before unloading or lift-off
   kContact,  ///< of the foot that comes down, before double support
 };
 

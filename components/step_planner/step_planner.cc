@@ -12,6 +12,7 @@
 #include "components/messages/motion.h"
 #include "components/messages/robot_resource.h"
 #include "components/robot/sole.h"
+#include "components/step_planner/capture_monitor.h"
 #include "components/step_planner/planner_config.h"
 #include "components/step_planner/recovery_config.h"
 #include "components/step_planner/status_report.h"
@@ -193,7 +194,7 @@ int8_t StepPlanner::Act(const operate::act_t& act, double time) {
 }
 
 stepping::WalkCommand StepPlanner::WalkCommandAt(double time) const {
-  const int begun = walks_dynamically_ ? recovery_.num_steps() : walk_.num_begun();
+  const int begun = walks_dynamically_ ? recovery_.num_begun() : walk_.num_begun();
   if (!operator_walk_.given) return stride_port_ ? planned_ : walk_commands_.At(time, begun);
   const double* const v = operator_walk_.velocity;
   bool stepping = operator_walk_.stepping;
@@ -384,14 +385,14 @@ void StepPlanner::Report(double time, const Capture& capture) {
   const balance::ConvexPolygon soles =
       capture.known ? Soles(capture.frame_o, sole_) : balance::ConvexPolygon();
   if (soles.num_corners > 0) {
-    ReportCapture(time, capture.frame_o, soles, capture.pendulum, &step_needed_, status);
+    MonitorCapture(time, capture.frame_o, soles, capture.pendulum, &step_needed_, status);
   }
   if (!has_recovery_ && !walks_quasi_static_) return;
   const bool walking = walks_quasi_static_ && owner_ != FeetOwner::kRecovery;
   ReportStepping(walking ? walk_.status() : recovery_.status(),
                  walking && walk_.active() ? walk_.command() : recovery_.command(), time,
                  estimate.sole, status);
-  status->num_steps = recovery_.num_steps() + walk_.num_begun();
+  status->num_steps = recovery_.num_begun() + walk_.num_begun();
   const FootstepInput input{.time = time,
                             .com_height = estimate.com.z(),
                             .sole = estimate.sole,

@@ -69,7 +69,7 @@ class StepPlanner : public Component, public Operated {
   /// The scenario's or the port's, until an operator has commanded another.
   stepping::WalkCommand WalkCommandAt(double time) const;
   /// Steps since the start: begun ones of a dynamic walk, landed ones of a quasi-static walk.
-  int NumSteps() const { return walks_dynamically_ ? recovery_.num_steps() : walk_.num_steps(); }
+  int NumSteps() const { return walks_dynamically_ ? recovery_.num_begun() : walk_.num_landed(); }
   /// STATUS_* of the plan.
   int8_t Plan(double time);
   /// What the robot says to the schedule.

@@ -25,12 +25,11 @@ void FillTransition(const SupportView& view, support_plan_t* plan) {
   support_plan_t& out = *plan;
   if (view.held) {
     const stepping::StepOutput* steps = view.steps;
-    const int kind = steps != nullptr ? steps->transition : 0;
-    out.transition = kind < 0   ? support_plan_t::TRANSITION_UNLOADING
-                     : kind > 0 ? support_plan_t::TRANSITION_LOADING
-                                : support_plan_t::TRANSITION_NONE;
-    out.transition_foot = kind == 0 ? int8_t{-1} : static_cast<int8_t>(steps->foot);
-    out.transition_progress = kind == 0 ? 0 : steps->progress;
+    const TransitionKind kind = steps != nullptr ? steps->transition : TransitionKind::kNone;
+    const bool none = kind == TransitionKind::kNone;
+    out.transition = TransitionCode(kind);
+    out.transition_foot = none ? int8_t{-1} : static_cast<int8_t>(steps->foot);
+    out.transition_progress = none ? 0 : steps->progress;
     return;
   }
   const ScheduleState& schedule = view.schedule.state();

@@ -49,7 +49,7 @@ RegionFinder::RegionFinder(const StepChoice& choice) {
       foothold_[i][k] = Farthest(footholds_[i], Direction(k));
       const double way = (foothold_[i][k] - Vector2d(0, side * limits.spacing)).norm();
       time_[i][k] =
-          limits.unload + std::max(limits.least_swing, SwingTime(way, limits.acceleration));
+          limits.unload + std::max(limits.least_swing, LeastSwingTime(way, limits.acceleration));
     }
   }
 }

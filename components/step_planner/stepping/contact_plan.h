@@ -21,6 +21,14 @@ enum class Stage {
   kCatching    ///< both feet carry until the COM rests or another step begins
 };
 
+/// What happens to a foot's load.
+enum class TransitionKind { kNone, kUnloading, kLoading };
+inline TransitionKind TransitionOf(Stage stage) {
+  return stage == Stage::kUnloading ? TransitionKind::kUnloading
+         : stage == Stage::kLoading ? TransitionKind::kLoading
+                                    : TransitionKind::kNone;
+}
+
 /// One step. Times in s of the run, as planned until they have come.
 struct Footstep {
   Foot foot = Foot::kRight;

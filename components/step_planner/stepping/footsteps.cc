@@ -69,6 +69,11 @@ Foothold Towards(const Foothold& step, const Foothold& wanted, double most, cons
   return moved;
 }
 
+Foot FirstFoot(const WalkCommand& command) {
+  const double left = command.velocity.y() != 0 ? command.velocity.y() : command.turn_rate;
+  return left > 0 ? Foot::kLeft : Foot::kRight;
+}
+
 WalkCommand Approach(const WalkCommand& from, const WalkCommand& command, double speed,
                      double turn) {
   WalkCommand next = command;

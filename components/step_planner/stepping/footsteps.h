@@ -65,6 +65,9 @@ Stride NominalStride(const Foothold& stance, Foot foot, const WalkCommand& comma
 Foothold Towards(const Foothold& step, const Foothold& wanted, double most, const Foothold& stance,
                  Foot foot, const FootstepLimits& limits);
 
+/// The foot that steps first: the left one to go or turn left, else the right one.
+Foot FirstFoot(const WalkCommand& command);
+
 /// `command` approached from `from` by at most `speed`, m/s, and `turn`, rad/s.
 WalkCommand Approach(const WalkCommand& from, const WalkCommand& command, double speed,
                      double turn);

@@ -56,11 +56,6 @@ void BodyHeading::Follow(double stance, double other, double period) {
   turned_.Follow(yaw + std::remainder(heading - start_ - yaw, 2 * M_PI), period);
 }
 
-Foot FirstFoot(const WalkCommand& command) {
-  const double left = command.velocity.y() != 0 ? command.velocity.y() : command.turn_rate;
-  return left > 0 ? Foot::kLeft : Foot::kRight;
-}
-
 PointMotion LeadByCop(const StepInput& input, const Quintic::Point& height,
                       const Eigen::Vector3d& cop) {
   const double rate =

@@ -61,7 +61,7 @@ struct StepStatus {
 /// What the plan takes over while steps are made.
 struct StepOutput {
   FootArray<bool> in_contact{true, true};
-  int transition = 0;  ///< −1: `foot` is unloaded, 1: loaded, 0: neither
+  TransitionKind transition = TransitionKind::kNone;  ///< of `foot`
   double progress = 0;
   Foot foot = Foot::kRight;  ///< that steps, or last did
   PointMotion com;
@@ -127,9 +127,6 @@ class BodyHeading {
   double start_ = 0;  // rad
   DampedLead turned_;
 };
-
-/// The foot that steps first: of the side that the robot goes or turns to.
-Foot FirstFoot(const WalkCommand& command);
 
 /// Leads the COM by the centre of pressure `cop`, m, world, on the ground: in x and y it has the
 /// pendulum's acceleration (g + z̈)/(z − ground) (c − p), and neither position nor velocity to

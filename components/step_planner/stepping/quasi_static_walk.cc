@@ -214,7 +214,7 @@ double QuasiStaticWalk::Loaded(const StepInput& input) const {
 
 void QuasiStaticWalk::Land(const StepInput& input, const StepState& state,
                            const WalkCommand& command) {
-  ++num_steps_;
+  ++num_landed_;
   in_contact_ = {true, true};
   const Foot foot = Other(stance_);
   sole_[foot].Expect(input.sole[foot], input.load[foot], spec_.weight, spec_.most_sinking);
@@ -401,13 +401,13 @@ void QuasiStaticWalk::Lead(const StepInput& input, const StepState& state) {
   output_.com = LeadByCop(input, height_.point(), output_.cop_reference);
   output_.in_contact = in_contact_;
   output_.Follow(foot_);
-  output_.transition = stage_ == Stage::kUnloading ? -1 : stage_ == Stage::kLoading ? 1 : 0;
+  output_.transition = TransitionOf(stage_);
   output_.foot = stage_ == Stage::kLoading ? stance_ : Other(stance_);
-  output_.progress = output_.transition == 0 ? 0 : Progress(input.time);
+  output_.progress = output_.transition == TransitionKind::kNone ? 0 : Progress(input.time);
 }
 
 void QuasiStaticWalk::Archive(StateArchive* archive) {
-  archive->Show(stage_, command_, stance_, num_steps_, in_contact_, steps_, foot_, height_,
+  archive->Show(stage_, command_, stance_, num_landed_, in_contact_, steps_, foot_, height_,
                 heading_, pressed_, sole_, ramp_slowdown_, time_, since_, moving_since_,
                 standing_height_, starting_, course_, unloaded_, lowered_, start_, wanted_,
                 cop_jump_, predicted_capture_point_, offset_, output_);

@@ -65,11 +65,11 @@ class QuasiStaticWalk {
   const StepOutput& output() const { return output_; }
   bool active() const { return stage_ != Stage::kStanding; }
   Stage stage() const { return stage_; }
-  int num_steps() const { return num_steps_; }  ///< feet that have landed, since the start
+  int num_landed() const { return num_landed_; }  ///< feet that have landed, since the start
   /// Steps begun since the start, the one under way too.
   int num_begun() const {
     const bool under_way = active() && stage_ != Stage::kLoading && stage_ != Stage::kCatching;
-    return num_steps_ + (under_way ? 1 : 0);
+    return num_landed_ + (under_way ? 1 : 0);
   }
   Foot stepping_foot() const { return Other(stance_); }  ///< that is in the air, or the next to be
   /// On one foot, the capture point is beyond the stance sole: the walk does not bring it back.
@@ -77,7 +77,7 @@ class QuasiStaticWalk {
   /// Another planner moves the feet in this tick.
   void Stop(double time) {
     time_ = time;
-    num_steps_ = num_begun();
+    num_landed_ = num_begun();
     lowered_ = lowered_ || active();
     stage_ = Stage::kStanding;
     steps_.Clear();
@@ -156,7 +156,7 @@ class QuasiStaticWalk {
   Stage stage_ = Stage::kStanding;
   WalkCommand command_;
   Foot stance_ = Foot::kRight;
-  int num_steps_ = 0;
+  int num_landed_ = 0;
   FootArray<bool> in_contact_{true, true};
   ContactPlan steps_;  // empty: no step follows the one that has landed
   FootMotion foot_;

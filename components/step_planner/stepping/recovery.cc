@@ -98,8 +98,9 @@ bool Recovery::Update(const StepInput& input) {
   output_.Follow(foot_);
   output_.in_contact = in_contact_;
   output_.foot = plan_.foot;
-  output_.transition = stage_ == Stage::kUnloading ? -1 : stage_ == Stage::kLoading ? 1 : 0;
-  output_.progress = output_.transition == 0 ? 0 : std::clamp(Ramp(time), 0.0, 1.0);
+  output_.transition = TransitionOf(stage_);
+  output_.progress =
+      output_.transition == TransitionKind::kNone ? 0 : std::clamp(Ramp(time), 0.0, 1.0);
   time_ = time;
   return true;
 }
@@ -206,7 +207,7 @@ bool Recovery::TogetherNow(const StepInput& input, const StepState& state, StepP
 }
 
 void Recovery::BeginShift(const StepInput& input, const StepState& state) {
-  if (num_steps_ == 0) standing_height_ = input.com_height - input.sole[0].translation().z();
+  if (num_begun_ == 0) standing_height_ = input.com_height - input.sole[0].translation().z();
   height_.Begin(input.com_height);
   steps_now_ = 0;
   in_contact_ = input.in_contact;
@@ -241,7 +242,7 @@ void Recovery::Shift(const StepInput& input, const StepState& state, double exce
 bool Recovery::BeginStep(const StepInput& input, const StepPlan& plan, StepReason reason) {
   if (!plan.possible || !std::isfinite(plan.margin)) return false;
   reason_ = reason;
-  ++num_steps_;
+  ++num_begun_;
   ++steps_now_;
   since_ = input.time;
   cop_from_ = output_.cop;
@@ -480,7 +481,7 @@ void Recovery::LeadCom(const StepInput& input, const StepState& state) {
 }
 
 void Recovery::Archive(StateArchive* archive) {
-  archive->Show(stage_, reason_, num_steps_, steps_now_, in_contact_, plan_, steps_, foot_, height_,
+  archive->Show(stage_, reason_, num_begun_, steps_now_, in_contact_, plan_, steps_, foot_, height_,
                 outside_, near_edge_, time_, since_, ramp_from_, stays_outside_, stays_near_edge_,
                 excess_at_edge_, moving_since_, cop_from_, standing_height_, together_asked_,
                 shift_, step_helps_, command_, turns_, heading_, stride_, output_);

@@ -56,7 +56,7 @@ class Recovery {
   bool would_step() const { return active() || step_helps_; }
   Stage stage() const { return stage_; }
   StepReason reason() const { return reason_; }
-  int num_steps() const { return num_steps_; }  ///< since the start
+  int num_begun() const { return num_begun_; }  ///< since the start
   StepStatus status() const;
   const ContactPlan& steps() const { return steps_; }
   const StepChoice& choice() const { return choice_; }
@@ -157,7 +157,7 @@ class Recovery {
   RecoverySpec spec_;
   Stage stage_ = Stage::kStanding;
   StepReason reason_ = StepReason::kNone;
-  int num_steps_ = 0, steps_now_ = 0;
+  int num_begun_ = 0, steps_now_ = 0;
   FootArray<bool> in_contact_{true, true};
   StepPlan plan_;  // of the first step, or of the last one that has landed
   ContactPlan steps_;

@@ -53,7 +53,7 @@ void StepPlan::Archive(StateArchive* archive) {
                 missed, moved, crossing, around, corner);
 }
 
-double SwingTime(double distance, double acceleration) {
+double LeastSwingTime(double distance, double acceleration) {
   return std::sqrt(kQuinticAcceleration * distance / acceleration);
 }
 
@@ -239,8 +239,8 @@ StepPlan StepChoice::Stride(const StepState& state, Foot foot, const Gait& gait,
                             double unload) const {
   const auto least = [&](const StepPlan& plan) {
     return unload +
-           std::max(limits_.least_swing,
-                    SwingTime((plan.foothold - state.sole[foot]).norm(), limits_.acceleration));
+           std::max(limits_.least_swing, LeastSwingTime((plan.foothold - state.sole[foot]).norm(),
+                                                        limits_.acceleration));
   };
   double time = unload + gait.period - gait.transfer;
   StepPlan plan = StrideAt(state, foot, gait, time);
@@ -266,7 +266,7 @@ StepPlan StepChoice::Plan(const StepState& state, Foot foot, Crossing crossing) 
     const double swing =
         plan.around
             ? std::sqrt(CornerAcceleration(from, plan.corner, plan.foothold) / limits_.acceleration)
-            : SwingTime((plan.foothold - from).norm(), limits_.acceleration);
+            : LeastSwingTime((plan.foothold - from).norm(), limits_.acceleration);
     double needed = unload + std::max(limits_.least_swing, swing);
     // Later the COM is nearer to where the foot has to go.
     if (!std::isfinite(plan.margin)) needed = time + kLater;

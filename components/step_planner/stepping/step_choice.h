@@ -72,7 +72,7 @@ struct Gait {
 };
 
 /// Least time of a quintic over `distance`, m, whose acceleration stays below `acceleration`, m/s².
-double SwingTime(double distance, double acceleration);
+double LeastSwingTime(double distance, double acceleration);
 
 /// Pure functions of model, reach and limits.
 class StepChoice {

@@ -22,7 +22,7 @@ TEST(QuasiStaticWalk, StandsUntilItIsTold) {
 TEST(QuasiStaticWalk, TenStepsAheadAndAStop) {
   World world(TestRobot::kDyros);
   world.Run(32, {{0.05, 0}, 0, true});
-  EXPECT_GE(world.walk().num_steps(), 9);
+  EXPECT_GE(world.walk().num_landed(), 9);
   world.Run(6, kStand);
   EXPECT_FALSE(world.walk().active());
   EXPECT_NEAR((world.com().head<2>() - world.middle()).norm(), 0, 0.02);
@@ -65,16 +65,16 @@ TEST(QuasiStaticWalk, StandsAsItsFeetAre) {
   const WalkCommand command{{0.05, 0}, 0, true};
   world.Run(12, command);
   ASSERT_TRUE(world.RunTo(Stage::kSwinging, command));
-  const int steps = world.walk().num_steps();
+  const int steps = world.walk().num_landed();
   world.Run(8, kStand);
   EXPECT_FALSE(world.walk().active());
-  EXPECT_EQ(world.walk().num_steps(), steps + 1);  // the one that was under way
+  EXPECT_EQ(world.walk().num_landed(), steps + 1);  // the one that was under way
   const Vector3d apart = world.sole()[1].translation() - world.sole()[0].translation();
   EXPECT_NEAR(std::abs(apart.x()), 0.05 * world.spec().period(), 0.01);
   EXPECT_NEAR((world.com().head<2>() - world.middle()).norm(), 0, 0.02);
   // And walks on from there.
   world.Run(16, command);
-  EXPECT_GT(world.walk().num_steps(), steps + 4);
+  EXPECT_GT(world.walk().num_landed(), steps + 4);
 }
 
 TEST(QuasiStaticWalk, KeepsToTheCommandedVelocity) {
@@ -117,7 +117,7 @@ TEST(QuasiStaticWalk, RestsAboveTheSoleThatCarriesHoweverLateTheOtherComesDown) 
     rested = true;
   }
   EXPECT_TRUE(rested);
-  EXPECT_GE(world.walk().num_steps(), 12);
+  EXPECT_GE(world.walk().num_landed(), 12);
   world.Run(15, kStand);
   EXPECT_FALSE(world.walk().active());
 }
@@ -130,7 +130,7 @@ TEST(QuasiStaticWalk, LoadLeavesAFootNoSoonerThanTheCentreOfPressure) {
   for (int i = 0; i < 10000; ++i) {
     world.Run(kPeriod, command);
     const QuasiStaticWalk& walk = world.walk();
-    if (walk.stage() != Stage::kUnloading || walk.num_steps() == 0) continue;
+    if (walk.stage() != Stage::kUnloading || walk.num_landed() == 0) continue;
     const auto leaves = robot::Index(walk.stepping_foot());
     const Vector2d other = world.sole()[1 - leaves].translation().head<2>();
     const Vector2d way = world.sole()[leaves].translation().head<2>() - other;
@@ -232,11 +232,11 @@ TEST(QuasiStaticWalk, KeepsARobotThatStopsOnSoftGround) {
     world.Run(20, kStand);
     EXPECT_EQ(world.walk().active(), depth > 0);
     EXPECT_NEAR((world.com().head<2>() - world.middle()).norm(), 0, 0.02) << depth;
-    const int steps = world.walk().num_steps();
+    const int steps = world.walk().num_landed();
     world.Run(5, kStand);
-    EXPECT_EQ(world.walk().num_steps(), steps) << depth;
+    EXPECT_EQ(world.walk().num_landed(), steps) << depth;
     world.Run(12, command);
-    EXPECT_GT(world.walk().num_steps(), steps) << depth;
+    EXPECT_GT(world.walk().num_landed(), steps) << depth;
   }
 }
 
@@ -257,7 +257,7 @@ TEST(QuasiStaticWalk, TheArchiveIsAllOfItsState) {
       ASSERT_EQ(worlds[0].com(), worlds[1].com()) << tick;
       ASSERT_EQ(worlds[0].walk().output().cop, worlds[1].walk().output().cop) << tick;
     }
-    EXPECT_GE(worlds[0].walk().num_steps(), 4);
+    EXPECT_GE(worlds[0].walk().num_landed(), 4);
   }
 }
 
@@ -272,7 +272,7 @@ TEST(QuasiStaticWalk, AFootThatFindsNothingWaitsWhereItIs) {
     const Vector2d off = world.capture_point() - world.sole()[stance].translation().head<2>();
     EXPECT_LT(off.norm(), 0.02) << i;
   }
-  EXPECT_EQ(world.walk().num_steps(), 0);
+  EXPECT_EQ(world.walk().num_landed(), 0);
 }
 
 // Soles that sink by 2.5 and 7 times what counts as soft: the swing takes the root of it longer,

@@ -180,12 +180,12 @@ class World {
       decided_ = time_;
     }
     // As it lands the other foot may leave.
-    const int steps = recovery_.num_steps();
+    const int steps = recovery_.num_begun();
     const bool lands = now == Stage::kLoading || steps > last_steps_;
     if (before == Stage::kSwinging && lands && touched_ < 0) touched_ = time_;
     last_steps_ = steps;
     last_cop_ = output.cop;
-    if (output.transition != 0 && output.transition == last_transition_) {
+    if (output.transition != TransitionKind::kNone && output.transition == last_transition_) {
       fastest_ramp_ = std::max(fastest_ramp_, output.progress - last_progress_);
     }
     last_transition_ = output.transition;
@@ -204,7 +204,7 @@ class World {
   Vector2d last_cop_ = Vector2d::Zero();
   double nearest_ = 1, largest_jump_ = 0, touched_ = -1, decided_ = -1;
   int last_steps_ = 0;
-  int last_transition_ = 0;
+  TransitionKind last_transition_ = TransitionKind::kNone;
   double last_progress_ = 0, fastest_ramp_ = 0;
 };
 
@@ -243,7 +243,7 @@ TEST_P(RecoveryCase, WhatLingersAtTheEdgeAndComesOutGetsAStepSooner) {
       const double near = world.time();
       EXPECT_TRUE(world.Run(4)) << degrees;
       EXPECT_TRUE(world.Rests()) << degrees;
-      EXPECT_EQ(world.recovery().num_steps(), 1) << degrees;
+      EXPECT_EQ(world.recovery().num_begun(), 1) << degrees;
       decided[lingers ? 1 : 0] = world.decided();
       if (!lingers) continue;
       EXPECT_EQ(world.recovery().reason(), StepReason::kLingering) << degrees;
@@ -292,7 +292,7 @@ TEST_P(RecoveryCase, NoFootIsSentFartherThanLegsReachHoweverHardThePush) {
         ASSERT_LT((step.at.position - stance).norm(), farthest) << i << ' ' << share;
         ASSERT_LT(step.touch_down - world.time(), 4 / world.Frequency()) << i << ' ' << share;
       }
-      steps += world.recovery().num_steps();
+      steps += world.recovery().num_begun();
     }
   }
   EXPECT_GT(steps, 10);
@@ -305,7 +305,7 @@ TEST_P(RecoveryCase, WhatTheSolesCanStopGetsNoStep) {
     world.Push(0.97 * world.mass() * world.Frequency() * EdgeDistance(world, direction, 0.01) *
                direction);
     EXPECT_TRUE(world.Run(4)) << degrees;
-    EXPECT_EQ(world.recovery().num_steps(), 0) << degrees;
+    EXPECT_EQ(world.recovery().num_begun(), 0) << degrees;
   }
 }
 
@@ -320,9 +320,9 @@ TEST_P(RecoveryCase, OneStepCatchesWhatTheClosedFormSays) {
     for (double impulse = 0.1 * scale; impulse < 0.6 * scale; impulse += 0.01 * scale) {
       World world(GetParam());
       world.Push(impulse * direction);
-      if (!world.Run(6) || world.recovery().num_steps() > 1) break;
+      if (!world.Run(6) || world.recovery().num_begun() > 1) break;
       EXPECT_TRUE(world.Rests()) << impulse;
-      if (world.recovery().num_steps() == 1) time = world.touched();
+      if (world.recovery().num_begun() == 1) time = world.touched();
       largest = impulse;
     }
     ASSERT_GT(time, 0);
@@ -342,9 +342,9 @@ TEST_P(RecoveryCase, AHarderPushTakesMoreSteps) {
     World world(GetParam());
     world.Push({share * still.mass() * still.Frequency() * rest, 0});
     if (!world.Run(6)) break;
-    EXPECT_GE(world.recovery().num_steps(), last) << share;
+    EXPECT_GE(world.recovery().num_begun(), last) << share;
     EXPECT_TRUE(world.Rests()) << share;
-    last = world.recovery().num_steps();
+    last = world.recovery().num_begun();
   }
   EXPECT_GE(last, 1);
 }
@@ -355,7 +355,7 @@ TEST_P(RecoveryCase, TheFootInTheAirStepsAtOnce) {
   // To the left, where the free foot is.
   world.Push({0, 1.5 * world.mass() * world.Frequency() * 0.5 * world.model().feet()[0].width});
   EXPECT_TRUE(world.Run(5));
-  EXPECT_GE(world.recovery().num_steps(), 1);
+  EXPECT_GE(world.recovery().num_begun(), 1);
   EXPECT_EQ(world.recovery().output().in_contact, (std::array{true, true}));
   EXPECT_TRUE(world.Rests());
 }
@@ -379,9 +379,9 @@ TEST_P(RecoveryCase, TheFootInTheAirGoesAroundTheOther) {
       world.Push(impulse * way.direction);
       const bool stands = world.Run(6);
       EXPECT_GT(world.nearest(), 0.01) << way.direction.transpose() << ' ' << impulse;
-      if (!stands || world.recovery().num_steps() > 1) break;
+      if (!stands || world.recovery().num_begun() > 1) break;
       EXPECT_TRUE(world.Rests()) << impulse;
-      if (world.recovery().num_steps() == 1) time = world.touched();
+      if (world.recovery().num_begun() == 1) time = world.touched();
       largest = impulse;
     }
     ASSERT_GT(time, 0) << way.direction.transpose();
@@ -401,14 +401,14 @@ TEST_P(RecoveryCase, TheFeetComeSideBySideWhenAsked) {
     world.Push({1.1 * world.mass() * world.Frequency() * rest, 0});
     ASSERT_TRUE(world.Run(5));
     ASSERT_TRUE(world.Rests());
-    const int steps = world.recovery().num_steps();
+    const int steps = world.recovery().num_begun();
     ASSERT_GE(steps, 1);
     EXPECT_GT((world.soles()[1].translation() - world.soles()[0].translation()).cwiseAbs().x(),
               0.05);
     world.recovery().BringTogether();
     ASSERT_TRUE(world.Run(8));
     EXPECT_TRUE(world.Rests());
-    EXPECT_EQ(world.recovery().num_steps(), steps + 1);
+    EXPECT_EQ(world.recovery().num_begun(), steps + 1);
     const Vector3d apart = world.soles()[1].translation() - world.soles()[0].translation();
     EXPECT_NEAR(apart.x(), 0, 0.005);
     EXPECT_NEAR(apart.y(), robot::StandingSpacing(world.model()), 0.005);
@@ -416,7 +416,7 @@ TEST_P(RecoveryCase, TheFeetComeSideBySideWhenAsked) {
     // Where they are, nothing is to be done.
     world.recovery().BringTogether();
     world.Run(3);
-    EXPECT_EQ(world.recovery().num_steps(), steps + 1);
+    EXPECT_EQ(world.recovery().num_begun(), steps + 1);
   }
 }
 
@@ -448,8 +448,8 @@ TEST_P(RecoveryCase, APushWhileTheFeetComeTogetherJumpsNoLoad) {
       world.Tick();
       if (!unloads() || world.recovery().reason() == StepReason::kTogether) continue;
       ++hurried;
-      const auto lands = [&, step = world.recovery().num_steps()] {
-        return world.recovery().stage() == Stage::kLoading || world.recovery().num_steps() > step;
+      const auto lands = [&, step = world.recovery().num_begun()] {
+        return world.recovery().stage() == Stage::kLoading || world.recovery().num_begun() > step;
       };
       for (int i = 0; i < 2000 && !lands(); ++i) world.Tick();
       // Unloaded within 0.04 s, then 0.2 s in the air, or as long as the way takes.
@@ -474,14 +474,14 @@ TEST_P(RecoveryCase, WalksWhereItIsTold) {
     ASSERT_TRUE(world.Run(5)) << share.transpose();
     const Vector2d from = world.com().head<2>();
     const double since = world.time();
-    const int steps = world.recovery().num_steps();
+    const int steps = world.recovery().num_begun();
     ASSERT_TRUE(world.Run(5)) << share.transpose();
     const Vector2d velocity = (world.com().head<2>() - from) / (world.time() - since);
     EXPECT_LT((velocity - speed * share).norm(), 0.15 * speed * share.norm() + 0.02)
         << velocity.transpose() << " of " << (speed * share).transpose();
     // ωT = 1.3 a step, and no more than loading and unloading later: here both soles carry alike,
     // so that no foot leaves before its ramp ends.
-    const double stride = shape.Frequency() * 5 / (world.recovery().num_steps() - steps);
+    const double stride = shape.Frequency() * 5 / (world.recovery().num_begun() - steps);
     EXPECT_GT(stride, 1.2);
     EXPECT_LT(stride, 1.3 + shape.Frequency() * 0.1);
     world.Stop();
@@ -531,7 +531,7 @@ TEST_P(RecoveryCase, TheCentreOfPressureDoesNotJump) {
   World world(GetParam());
   world.Push({1.2 * world.mass() * world.Frequency() * EdgeDistance(world, {1, 0}, 0), 0});
   EXPECT_TRUE(world.Run(4));
-  EXPECT_GE(world.recovery().num_steps(), 1);
+  EXPECT_GE(world.recovery().num_begun(), 1);
   // 0.4 m in the shortest ramp's steepest part: 1.875 · 0.4 m · 2 ms / 0.04 s.
   EXPECT_LT(world.largest_jump(), 0.0375);
 }

@@ -100,7 +100,7 @@ class World {
   }
   double Ground(const Eigen::Isometry3d& sole) const {
     if (IsAt(hole_, sole)) return -1;
-    return walk_.num_steps() % 3 == 1 ? -rough_ : 0;
+    return walk_.num_landed() % 3 == 1 ? -rough_ : 0;
   }
 
   StepInput See() const {
