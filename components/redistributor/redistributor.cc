@@ -30,8 +30,8 @@ constexpr double kMostLightShare = 0.45;
 constexpr double kRatioRamp = 0.5;
 // 1/s: half of what shakes a foot on something soft (redistributor.proto).
 constexpr double kMostIntegral = 40;
-// Share of a joint's torque that stays free, so that no motor cuts what rounding adds. It is less
-// than StepBalance's, whose torques are within the limit here for that.
+// Share of a joint's torque that stays free, so that no motor cuts what rounding adds. StepBalance
+// leaves more free, so that its torques keep this limit.
 constexpr double kTorqueRounding = 1e-6;
 
 bool AllFinite(const std::vector<double>& values) {

@@ -38,11 +38,10 @@ constexpr double kLeastSwingEffort = 0.35, kMostSwingEffort = 0.9;
 // m/s by which a filter as fast as the gears allow may misjudge a swing foot. Fitted: heron, whose
 // gears are soft, stands 41 of 96 pushes with 0.35 of the effort and 33 with 0.9.
 constexpr double kSpeedError = 0.11;
-// s of the ramp (61) before a foot leaves the ground, and s in the air at least: shorter ones gain
-// nothing (docs/lab/steps).
+// s of the ramp (61) before a foot leaves the ground, and s in the air at least. On a point mass
+// shorter ones catch no more (docs/lab/steps/2026-11-28-level-feet.md).
 constexpr double kUnload = 0.02, kLeastSwing = 0.12;
-// m between the soles, sideways: by less a swing foot misses its foothold.
-constexpr double kGap = 0.02;
+constexpr double kGap = 0.02;          // m between the soles, sideways
 constexpr double kComLowering = 0.06;  // m by which longer steps lower the COM at most
 // rad off the joints' limits at footholds: as far as a leg's joint overshoots.
 constexpr double kFootholdJointMargin = 0.1;

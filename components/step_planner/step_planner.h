@@ -58,7 +58,7 @@ class StepPlanner : public Component, public Operated {
   struct Capture {
     bool known = false;  ///< else the COM is below the soles, or a number is not finite
     Eigen::Isometry3d frame_o = Eigen::Isometry3d::Identity();
-    /// Of the COM's own momentum alone; Recovery's counts half of the angular momentum, too.
+    /// It counts the COM's own momentum alone; Recovery's counts half of the angular momentum, too.
     balance::CapturePoint pendulum;
   };
 

@@ -76,8 +76,7 @@ constexpr double kTurnAcceleration = 0.2;  // rad/s² with which the turn rate i
 // robot.
 constexpr double kFootholdJointMargin = 0.1;  // rad off the joints' limits at footholds
 constexpr double kTouchDuration = 0.002;      // s of contact.touch_load that are a landing
-// s, time constant with which a foot that has touched is let go in the ground's plane: some ticks,
-// as it settles for a fifth of a second.
+// s, time constant with which a foot that has touched is let go in the ground's plane.
 constexpr double kRelaxTime = 0.015;
 
 constexpr double kRounding = 1e-6;

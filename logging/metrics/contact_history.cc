@@ -9,8 +9,7 @@ namespace {
 
 // A reading beyond this many standard deviations of its noise is a load.
 constexpr double kNoiseDeviations = 5;
-// m from its reference's end, beyond which a contact is reported as early or late: a sole that
-// tilts or sinks is off by less.
+// m from its reference's end, beyond which a contact is reported as early or late.
 constexpr double kExpectedWithin = 0.02;
 
 std::array<bool, 2> Contacts(const std::vector<int8_t>& in_contact) {

@@ -108,7 +108,7 @@ class Runs(unittest.TestCase):
         with open(log, "r+b") as file:
             data = file.read()
             size = len(data)
-            # From a record on, some ticks: a record that is damaged in its message's numbers alone is none to tell.
+            # The damage begins with a record: a reader cannot tell a record of which only the numbers are damaged.
             file.seek(data.index(b"\xed\xa1\xda\x01", size // 2))
             file.write(b"\xff" * 20000)
             file.truncate(size - 777)

@@ -15,7 +15,7 @@ namespace poise {
 struct LandingSpec {
   double touch_load = 0;     ///< N on the sole that are contact
   double release_load = 0;   ///< N below which it is lost again
-  double press_load = 0;     ///< N at which the search comes to a stand
+  double press_load = 0;     ///< N at which the search comes to a stand, and of a press
   double observed_load = 0;  ///< N that an observed load must be above at least to be contact
   /// s that a load must last, or its loss: ten periods of 500 Hz, longer than the sensor's noise.
   double touch_duration = 0.02;
@@ -108,6 +108,7 @@ class Landing {
   bool Update(bool before_touch_down, bool due, const Eigen::Isometry3d& sole,
               PointMotion* reference, Eigen::Matrix3d* rotation);
   State state() const { return state_; }
+  const LandingSpec& spec() const { return spec_; }
   void Archive(StateArchive* archive);
 
  private:

@@ -31,9 +31,9 @@ struct CaptureMove {
 };
 
 /// m, world: the centre of pressure that leads the capture point along `reference`,
-/// p = ξ_d − ξ̇_d/ω + (1 + gain)(ξ − ξ_d), so that its error decays at gain ω (Englsberger et al.
-/// 2011), or the point of `support` nearest to that. `beside`: m, by which the centre of pressure
-/// of the whole robot lies beside it, as the body turns; the sum of both stays within `support`.
+/// p = ξ_d − ξ̇_d/ω + (1 + gain)(ξ − ξ_d), or the point of `support` nearest to that. By
+/// ξ̇ = ω (ξ − p) the error then decays at gain ω. `beside`: m, by which the centre of pressure of
+/// the whole robot lies beside it, as the body turns; the sum of both stays within `support`.
 Eigen::Vector2d LeadingCop(const Pendulum& pendulum, const CaptureReference& reference, double gain,
                            const balance::ConvexPolygon& support,
                            const Eigen::Vector2d& beside = Eigen::Vector2d::Zero());

@@ -45,7 +45,8 @@ void FootMotion::Move(const Footstep& step, double time) {
 bool FootMotion::Update(const StepInput& input, Foot foot, const robot::FootModel& model) {
   const Eigen::Isometry3d& sole = input.sole[foot];
   const double deviation = input.load_deviation[foot];
-  const bool counts = !distrusts_early_load_ || !(deviation > 0) || input.time >= swing_.end() ||
+  const bool observed = landing_.spec().observed_load > 0 && deviation > 0;
+  const bool counts = !observed || input.time >= swing_.end() ||
                       LowestCorner(sole, model) < swing_.foothold().z() + kLowSole;
   landing_.Measure(input.time, counts ? input.load[foot] : 0, deviation);
   // What has touched looks for the ground from where it is, should it lose it.

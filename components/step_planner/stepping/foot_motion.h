@@ -18,8 +18,7 @@ struct StepInput;
 class FootMotion {
  public:
   FootMotion() = default;
-  explicit FootMotion(const LandingSpec& landing)
-      : landing_(landing), distrusts_early_load_(landing.observed_load > 0) {}
+  explicit FootMotion(const LandingSpec& landing) : landing_(landing) {}
 
   /// The foot leaves at `time`, s, from the motion `from` and turned by `rotation`, for `step`, on
   /// ground at the height `ground`, m. It is searched for down from `expected`, m.
@@ -27,8 +26,8 @@ class FootMotion {
                double ground, double expected, const SwingSpec& way, double time);
   /// Another foothold, and time; see Swing::Move.
   void Move(const Footstep& step, double time);
-  /// Once a tick. True: `foot`, whose sole is `model`'s, is a contact from now on. Where observed
-  /// loads have a least one (LandingSpec), such a load counts before it is time only of a sole that
+  /// Once a tick. True: `foot`, whose sole is `model`'s, is a contact from now on. With an
+  /// observed_load (LandingSpec) an observed load counts before the swing's end only where the sole
   /// is near the ground: a leg that brakes its swing is observed as a load.
   bool Update(const StepInput& input, Foot foot, const robot::FootModel& model);
   Landing::State state() const { return landing_.state(); }
@@ -40,7 +39,6 @@ class FootMotion {
  private:
   Swing swing_;
   Landing landing_{LandingSpec()};
-  bool distrusts_early_load_ = false;
   PointMotion reference_;
   RotationMotion rotation_;
 };

@@ -385,8 +385,9 @@ Vector2d Recovery::BrakingCop(const StepInput& input, const StepState& state) co
     return CopFor(input, state, sole, {state.sole[stance], Vector2d::Zero()}, kSwingBudget);
   }
   if (reason_ == StepReason::kWalk) {
-    const double left = steps_.first().touch_down + gait(state).transfer - input.time;
-    return CopFor(input, state, sole, choice_.StrideReference(state, stance, gait(state), left),
+    const Gait walk = gait(state);
+    const double left = steps_.first().touch_down + walk.transfer - input.time;
+    return CopFor(input, state, sole, choice_.StrideReference(state, stance, walk, left),
                   kSwingBudget);
   }
   // It only brakes: what is left of the way is the foot's.
@@ -404,9 +405,9 @@ Vector2d Recovery::CatchingCop(const StepInput& input, const StepState& state) c
     return CopFor(input, state, soles, shift_.At(input.time, to), kCatchBudget);
   }
   if (walks) {
-    const CaptureReference stride =
-        choice_.StrideReference(state, plan_.foot, gait(state), gait(state).period);
-    return CopFor(input, state, soles, stride, kSwingBudget);
+    const Gait walk = gait(state);
+    return CopFor(input, state, soles,
+                  choice_.StrideReference(state, plan_.foot, walk, walk.period), kSwingBudget);
   }
   return CopFor(input, state, soles, {MiddleOfSoles(state), Vector2d::Zero()}, kCatchBudget);
 }

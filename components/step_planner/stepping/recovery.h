@@ -137,10 +137,10 @@ class Recovery {
   double LoweringShare(const StepState& state) const;
 
   // Ratio: by this share of the capture point's error the centre of pressure goes beyond it, so
-  // that the error decays at this times ω. More asks soles for what they cannot give.
+  // that the error decays at this times ω.
   static constexpr double kGain = 0.4;
   // 1/s with which the COM's height goes where the legs ask for it, and the body's heading where
-  // the feet's is: within a step, and no faster than legs follow.
+  // the feet's is.
   static constexpr double kHeightRate = 8, kYawRate = 6;
   // m/s², a share of g, with which a commanded velocity is approached, and rad/s², a turn rate:
   // some steps to full speed, each within reach.
