@@ -16,7 +16,7 @@
 #include "components/robot/dynamics.h"
 #include "components/robot/posture.h"
 #include "components/robot/sole.h"
-#include "components/step_planner/leg_limits.h"
+#include "components/step_planner/legs/leg_limits.h"
 #include "components/step_planner/planner_config.h"
 
 namespace poise {

@@ -13,7 +13,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "components/robot/posture.h"
 #include "components/robot/sole.h"
-#include "components/step_planner/leg_limits.h"
+#include "components/step_planner/legs/leg_limits.h"
 #include "components/step_planner/planner_config.h"
 #include "components/step_planner/recovery_config.h"
 

@@ -26,6 +26,8 @@ const BELOW = {
   'components/messages': ['lcmtypes', 'components/framework', 'components/framework/configuration', 'components/robot', 'components/robot_files', 'components/balance'],
   'components': BUS,
   'components/step_planner/contact': BUS,
+  'components/step_planner/legs': BUS,
+  'components/step_planner/stepping': [...BUS, 'components/step_planner/contact', 'components/step_planner/legs'],
   'sim': BUS,
   'sim_ode': [...BUS, 'sim'],
   'sim_mujoco': [...BUS, 'sim'],

@@ -8,8 +8,8 @@
 
 #include "components/robot/dynamics.h"
 #include "components/robot/posture.h"
+#include "components/step_planner/legs/swing.h"
 #include "components/step_planner/recovery_config.h"
-#include "components/step_planner/stepping/swing.h"
 
 namespace poise {
 namespace {

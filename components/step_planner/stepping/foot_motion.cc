@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "components/step_planner/legs/reach.h"
 #include "components/step_planner/stepping/footwork.h"
-#include "components/step_planner/stepping/reach.h"
 
 namespace poise::stepping {
 namespace {

@@ -7,8 +7,8 @@
 #include "components/messages/motion.h"
 #include "components/robot/robot_model.h"
 #include "components/step_planner/contact/landing.h"
+#include "components/step_planner/legs/swing.h"
 #include "components/step_planner/stepping/contact_plan.h"
-#include "components/step_planner/stepping/swing.h"
 
 namespace poise::stepping {
 

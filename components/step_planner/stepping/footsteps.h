@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 
 #include "components/framework/state_archive.h"
-#include "components/step_planner/stepping/feet.h"
+#include "components/step_planner/legs/feet.h"
 
 namespace poise::stepping {
 

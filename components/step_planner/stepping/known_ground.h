@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "components/step_planner/stepping/feet.h"
+#include "components/step_planner/legs/feet.h"
 
 namespace poise::stepping {
 

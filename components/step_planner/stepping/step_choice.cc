@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "components/step_planner/stepping/swing.h"
+#include "components/step_planner/legs/swing.h"
 
 namespace poise::stepping {
 namespace {

@@ -7,11 +7,11 @@
 #include "components/balance/convex_polygon.h"
 #include "components/framework/state_archive.h"
 #include "components/robot/robot_model.h"
+#include "components/step_planner/legs/legs.h"
+#include "components/step_planner/legs/reach.h"
 #include "components/step_planner/stepping/cop_plan.h"
 #include "components/step_planner/stepping/footsteps.h"
-#include "components/step_planner/stepping/legs.h"
 #include "components/step_planner/stepping/pendulum.h"
-#include "components/step_planner/stepping/reach.h"
 
 namespace poise::stepping {
 

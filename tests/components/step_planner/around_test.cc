@@ -9,10 +9,10 @@
 
 #include "components/robot/dynamics.h"
 #include "components/robot/posture.h"
-#include "components/step_planner/stepping/legs.h"
-#include "components/step_planner/stepping/reach.h"
+#include "components/step_planner/legs/legs.h"
+#include "components/step_planner/legs/reach.h"
+#include "components/step_planner/legs/swing.h"
 #include "components/step_planner/stepping/step_choice.h"
-#include "components/step_planner/stepping/swing.h"
 #include "tests/robot/robot_test_support.h"
 #include "tests/test_seed.h"
 

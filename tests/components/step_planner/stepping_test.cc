@@ -8,10 +8,10 @@
 #include <random>
 
 #include "components/robot/posture.h"
+#include "components/step_planner/legs/reach.h"
+#include "components/step_planner/legs/swing.h"
 #include "components/step_planner/stepping/pendulum.h"
-#include "components/step_planner/stepping/reach.h"
 #include "components/step_planner/stepping/step_choice.h"
-#include "components/step_planner/stepping/swing.h"
 #include "tests/robot/robot_test_support.h"
 #include "tests/test_seed.h"
 

@@ -1,4 +1,4 @@
-#include "components/step_planner/stepping/swing.h"
+#include "components/step_planner/legs/swing.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,7 +6,7 @@
 
 #include "components/balance/convex_polygon.h"
 #include "components/robot/robot_model.h"
-#include "components/step_planner/stepping/feet.h"
+#include "components/step_planner/legs/feet.h"
 
 namespace poise::stepping {
 

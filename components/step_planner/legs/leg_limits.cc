@@ -1,4 +1,4 @@
-#include "components/step_planner/leg_limits.h"
+#include "components/step_planner/legs/leg_limits.h"
 
 #include <fmt/format.h>
 

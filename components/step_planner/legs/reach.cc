@@ -1,4 +1,4 @@
-#include "components/step_planner/stepping/reach.h"
+#include "components/step_planner/legs/reach.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>

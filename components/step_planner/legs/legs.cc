@@ -1,4 +1,4 @@
-#include "components/step_planner/stepping/legs.h"
+#include "components/step_planner/legs/legs.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,7 +5,7 @@
 #include <array>
 
 #include "components/robot/robot_model.h"
-#include "components/step_planner/stepping/feet.h"
+#include "components/step_planner/legs/feet.h"
 
 namespace poise::stepping {
 

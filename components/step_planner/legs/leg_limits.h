@@ -2,7 +2,7 @@
 #pragma once
 
 #include "components/robot/robot_model.h"
-#include "components/step_planner/stepping/reach.h"
+#include "components/step_planner/legs/reach.h"
 
 namespace poise {
 
