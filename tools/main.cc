@@ -74,6 +74,7 @@ int main(int argc, char** argv) {
   poise::AddWorldsCommand(&app, &command);
   poise::AddSweepCommand(&app, &command);
   poise::AddLimitCommand(&app, &command);
+  poise::AddLadderCommand(&app, &command);
   poise::AddBenchmarkCommand(&app, &command);
   poise::AddReportCommand(&app, &command);
   poise::AddBitsCommand(&app, &command);

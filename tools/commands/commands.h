@@ -23,6 +23,7 @@ void AddWorldsCommand(CLI::App* app, Command* command);
 void AddSweepCommand(CLI::App* app, Command* command);
 void AddBenchmarkCommand(CLI::App* app, Command* command);
 void AddLimitCommand(CLI::App* app, Command* command);
+void AddLadderCommand(CLI::App* app, Command* command);
 void AddReportCommand(CLI::App* app, Command* command);
 void AddBitsCommand(CLI::App* app, Command* command);
 void AddCompareCommand(CLI::App* app, Command* command);
