@@ -182,7 +182,8 @@ double Recovery::UnloadTime() const {
 }
 
 double Recovery::LoadTime() const {
-  return reason_ == StepReason::kTogether ? kTogetherRamp : kLoadTime;
+  if (reason_ == StepReason::kTogether) return kTogetherRamp;
+  return reason_ == StepReason::kWalk ? kWalkLoadTime : kLoadTime;
 }
 
 bool Recovery::TogetherNow(const StepInput& input, const StepState& state, StepPlan* plan) {
