@@ -39,6 +39,11 @@ double StepLength(const stepping::Reach& reach, robot::Foot foot, const Vector2d
   return longest;
 }
 
+/// m, where `foot` stands beside the other one.
+Vector2d Standing(const robot::RobotModel& model, robot::Foot foot) {
+  return {0, robot::Side(foot) * robot::StandingSpacing(model)};
+}
+
 }  // namespace
 
 StepLadder::StepLadder(const robot::RobotModel& model)
@@ -53,16 +58,22 @@ double StepLadder::impulse_scale() const {
 double StepLadder::Bound(const Vector2d& direction) const {
   const stepping::StepChoice& choice = recovery_.choice();
   const double frequency = std::sqrt(robot::kGravity / robot::StandingHeight(model_));
-  const double time = choice.limits().unload + choice.limits().least_swing;
+  const stepping::StepLimits& limits = choice.limits();
   const stepping::PointMass standing(model_, recovery_);
   const double edge = Farthest(standing.Soles(0), direction);
   double best = 0;
   for (const robot::Foot first : robot::kFeet) {
-    double caught = 0;
+    // The foot that steps is as far behind the one that stands as its last way ahead.
+    double caught = 0, time = limits.unload, behind = Standing(model_, first).dot(-direction);
     robot::Foot foot = first;
-    for (int k = 1; k <= kMostSteps; ++k, foot = robot::Other(foot)) {
-      caught += StepLength(choice.reach(), foot, direction) * std::exp(-frequency * k * time);
+    for (int k = 0; k < kMostSteps; ++k, foot = robot::Other(foot)) {
+      const double length = StepLength(choice.reach(), foot, direction);
+      const double swing =
+          stepping::LeastSwingTime(std::max(0.0, behind + length), limits.acceleration);
+      time += std::max(limits.least_swing, swing);
+      caught += length * std::exp(-frequency * time);
       best = std::max(best, caught);
+      behind = length;
     }
   }
   return model_.total_mass() * frequency * (edge + best);

@@ -15,12 +15,12 @@ class StepLadder {
   /// Throws ConfigError where the robot's legs reach nothing, or its soles are too small.
   explicit StepLadder(const robot::RobotModel& model);
 
-  /// N·s, the bound of N steps, of any number: m ω (r + Σ l_k e^{−ωkT}). T is the least time from
-  /// one touch-down to the next, r the way from the COM to the soles' edge, l_k that from the sole
-  /// that stands to the farthest one that the foot whose turn it is reaches, both along the unit
-  /// vector `direction`; the feet take turns, and the better one begins. The first step may begin
-  /// at once. Koolen, de Boer, Rebula, Goswami, Pratt: Capturability-based analysis and control of
-  /// legged locomotion, part 1, IJRR 2012.
+  /// N·s, the bound of N steps, of any number: m ω (r + Σ l_k e^{−ω t_k}). r is the way from the
+  /// COM to the soles' edge, l_k that from the sole that stands to the farthest one that the foot
+  /// whose turn it is reaches, both along the unit vector `direction`; at t_k it is there, as soon
+  /// as the hips bring it from where it was. The feet take turns, and the better one begins. The
+  /// longest step is the best as long as it takes less than 2/ω. Koolen, de Boer, Rebula, Goswami,
+  /// Pratt: Capturability-based analysis and control of legged locomotion, part 1, IJRR 2012.
   double Bound(const Eigen::Vector2d& direction) const;
   /// Whether the planner's steps keep a point mass from falling (PointMass) for `duration`, s, with
   /// a push whose start is counted from its start.
