@@ -5,7 +5,6 @@
 #include <string>
 
 #include "components/framework/configuration/configuration.h"
-#include "components/framework/configuration/field_rules.h"
 #include "sim/push.h"
 
 namespace poise {
@@ -25,14 +24,6 @@ void CheckChange(const Motor& change, const std::string& field) {
   if (change.has_rated_current()) RefuseChange(field + ".rated_current");
   if (change.has_peak_current()) RefuseChange(field + ".peak_current");
   if (change.has_encoder_counts()) RefuseChange(field + ".encoder_counts");
-  CheckNotNegative(change.rotor_inertia(), field + ".rotor_inertia");
-  CheckNotNegative(change.coulomb_friction(), field + ".coulomb_friction");
-  CheckNotNegative(change.viscous_friction(), field + ".viscous_friction");
-  CheckNotNegative(change.static_friction(), field + ".static_friction");
-  CheckPositive(change.stribeck_velocity(), field + ".stribeck_velocity");
-  if (change.has_torque_constant()) {
-    CheckPositive(change.torque_constant(), field + ".torque_constant");
-  }
 }
 
 void Apply(const Motor& change, const std::string& field, MotorModel* motor) {
@@ -127,25 +118,18 @@ SensorNoise SimulatedNoise(const RobotModel& model, const SimConfig& config) {
   const Imu& change = config.imu_change();
   if (change.has_link()) RefuseChange("imu_change.link");
   if (change.has_pose()) RefuseChange("imu_change.pose");
-  const auto choose = [](bool given, double value, const char* field, double other) {
-    CheckNotNegative(value, field);
-    return given ? value : other;
-  };
+  const auto choose = [](bool given, double value, double other) { return given ? value : other; };
   const robot::ImuModel& imu = model.imu();
   const SensorNoise noise{
-      .gyro = choose(change.has_gyro_noise(), change.gyro_noise(), "imu_change.gyro_noise",
-                     imu.gyro_noise),
-      .gyro_bias =
-          choose(change.has_gyro_bias(), change.gyro_bias(), "imu_change.gyro_bias", imu.gyro_bias),
+      .gyro = choose(change.has_gyro_noise(), change.gyro_noise(), imu.gyro_noise),
+      .gyro_bias = choose(change.has_gyro_bias(), change.gyro_bias(), imu.gyro_bias),
       .accelerometer = choose(change.has_accelerometer_noise(), change.accelerometer_noise(),
-                              "imu_change.accelerometer_noise", imu.accelerometer_noise),
+                              imu.accelerometer_noise),
       .accelerometer_bias = choose(change.has_accelerometer_bias(), change.accelerometer_bias(),
-                                   "imu_change.accelerometer_bias", imu.accelerometer_bias),
-      .force = choose(config.has_force_noise(), config.force_noise(), "force_noise",
-                      model.force_noise()),
-      .moment = choose(config.has_moment_noise(), config.moment_noise(), "moment_noise",
-                       model.moment_noise()),
-      .push = choose(true, config.push_sensor_noise(), "push_sensor_noise", 0)};
+                                   imu.accelerometer_bias),
+      .force = choose(config.has_force_noise(), config.force_noise(), model.force_noise()),
+      .moment = choose(config.has_moment_noise(), config.moment_noise(), model.moment_noise()),
+      .push = config.push_sensor_noise()};
   return config.sensor_noise() ? noise : SensorNoise{};
 }
 

@@ -56,11 +56,6 @@ int StepsPerTick(const SimConfig& config, double tick_period) {
 Drivetrain::Options DrivetrainOptions(const RobotModel& model,
                                       const std::vector<robot::MotorModel>& motors,
                                       const DriveTrain& drive, const SimConfig& config) {
-  CheckNotNegative(drive.torque_lag(), "drive_train.torque_lag");
-  CheckNotNegative(drive.current_resolution(), "drive_train.current_resolution");
-  CheckNotNegative(drive.backlash(), "drive_train.backlash");
-  CheckNotNegative(drive.gear_stiffness(), "drive_train.gear_stiffness");
-  CheckNotNegative(drive.gear_damping(), "drive_train.gear_damping");
   const Drivetrain::Options options{config.rotor_inertia(),      config.joint_friction(),
                                     config.friction_stiffness(), drive.backlash(),
                                     drive.gear_stiffness(),      drive.gear_damping()};
@@ -80,7 +75,6 @@ Drivetrain::Options DrivetrainOptions(const RobotModel& model,
 
 size_t DelaySteps(const DriveTrain& drive, double step) {
   const double delay = drive.sensor_delay();
-  CheckNotNegative(delay, "drive_train.sensor_delay");
   const double whole = std::round(delay / step);
   if (std::abs(delay / step - whole) > 1e-6 * std::max(whole, 1.0) || whole > 1e4) {
     throw ConfigError(

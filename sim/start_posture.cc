@@ -40,31 +40,29 @@ RobotState SolveStart(const RobotModel& model, const StartPosture& config) {
 
   RobotData data(model);
   const auto evaluate = [&](const Eigen::VectorXd& joints) { data = Evaluate(model, joints); };
-  double spacing = config.foot_spacing();
+  StartPosture complete = config;
   if (!config.has_foot_spacing() && model.stance().foot_spacing) {
-    spacing = *model.stance().foot_spacing;
+    complete.set_foot_spacing(*model.stance().foot_spacing);
   } else if (!config.has_foot_spacing()) {
     evaluate(Eigen::VectorXd::Zero(model.num_joints()));
-    spacing = data.foot_pose[robot::Foot::kLeft].translation().y() -
-              data.foot_pose[robot::Foot::kRight].translation().y();
+    complete.set_foot_spacing(data.foot_pose[robot::Foot::kLeft].translation().y() -
+                              data.foot_pose[robot::Foot::kRight].translation().y());
   }
-  double com_height = config.com_height();
   if (!config.has_com_height() && stands && model.stance().com_height) {
-    com_height = *model.stance().com_height;
+    complete.set_com_height(*model.stance().com_height);
   } else if (!config.has_com_height()) {
     evaluate(goal.nominal);
-    com_height = data.com.z() - data.foot_pose[robot::Foot::kRight].translation().z();
+    complete.set_com_height(data.com.z() - data.foot_pose[robot::Foot::kRight].translation().z());
   }
-  // Both may follow from the robot.
-  CheckPositive(spacing, "start.foot_spacing");
-  CheckPositive(com_height, "start.com_height");
+  CheckFields(complete, "start.");  // what followed from the robot
+  const double spacing = complete.foot_spacing();
 
   goal.foot[robot::Foot::kRight] = Isometry3d(Translation3d(0, -spacing / 2, 0));
   goal.foot[robot::Foot::kLeft] =
       Isometry3d(Translation3d(0, spacing / 2, config.left_foot_height()));
   const double above_right = config.left_foot_height() > 0 ? -spacing / 2 : 0;
   goal.com_xy = {config.com_x(), config.has_com_y() ? config.com_y() : above_right};
-  goal.com_height = com_height;
+  goal.com_height = complete.com_height();
   try {
     return robot::SolvePosture(model, goal);
   } catch (const robot::RobotError& error) {

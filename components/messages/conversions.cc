@@ -11,16 +11,6 @@
 #include "components/robot/sole.h"
 
 namespace poise {
-namespace {
-
-double Given(bool present, double value, const std::string& field) {
-  if (!present) throw ConfigError(field, "is missing; give a number greater than 0");
-  CheckPositive(value, field);  // it may follow from soles and a margin
-  return value;
-}
-
-}  // namespace
-
 bool ReadState(const robot_state_t& message, robot::RobotState* state) {
   state->base_position = GetVector3(message.base_position);
   const double* q = message.base_orientation;
@@ -130,10 +120,11 @@ ContactLimitsConfig WithinSoles(ContactLimitsConfig config, const robot::RobotMo
 }
 
 balance::ContactLimits ReadLimits(const ContactLimitsConfig& config, const std::string& field) {
+  RequireFields(config, {"half_length", "half_width"}, field + ".");
+  CheckFields(config, field + ".");  // they may follow from soles and a margin
   balance::ContactLimits limits;
-  limits.half_length =
-      Given(config.has_half_length(), config.half_length(), field + ".half_length");
-  limits.half_width = Given(config.has_half_width(), config.half_width(), field + ".half_width");
+  limits.half_length = config.half_length();
+  limits.half_width = config.half_width();
   limits.friction = config.friction();
   limits.yaw_friction = config.yaw_friction();
   return limits;

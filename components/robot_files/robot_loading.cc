@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "components/framework/configuration/config_error.h"
+#include "components/framework/configuration/field_rules.h"
 #include "components/robot/link_tree.h"
 #include "components/robot/sole.h"
 #include "components/robot/urdf_source.h"
@@ -15,16 +17,13 @@ namespace {
 
 constexpr int kContactDimension = 6;
 
-Eigen::Isometry3d ToIsometry(const Pose& pose, const std::string& field) {
+Eigen::Isometry3d ToIsometry(const Pose& pose) {
   Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
   result.translation() = Eigen::Vector3d(pose.x(), pose.y(), pose.z());
   result.linear() = (Eigen::AngleAxisd(pose.yaw(), Eigen::Vector3d::UnitZ()) *
                      Eigen::AngleAxisd(pose.pitch(), Eigen::Vector3d::UnitY()) *
                      Eigen::AngleAxisd(pose.roll(), Eigen::Vector3d::UnitX()))
                         .toRotationMatrix();
-  if (!result.matrix().allFinite()) {
-    throw RobotError(field + ": a number is not finite: correct it");
-  }
   return result;
 }
 
@@ -39,49 +38,42 @@ LinkTree::LinkPlace FindLink(const LinkTree& tree, const std::string& link,
   return place->second;
 }
 
-double Positive(double value, const std::string& field) {
-  if (!(value > 0) || !std::isfinite(value)) {
-    throw RobotError(fmt::format("{} is {}: it must be finite and above 0", field, value));
+/// Holds to the rules of robot.proto; what a robot cannot be used with is a RobotError.
+void Check(const auto& rules) {
+  try {
+    rules();
+  } catch (const ConfigError& error) {
+    throw RobotError(error.what());
   }
-  return value;
-}
-
-double NotNegative(double value, const std::string& field) {
-  if (!(value >= 0) || !std::isfinite(value)) {
-    throw RobotError(fmt::format("{} is {}: it must be finite and not negative", field, value));
-  }
-  return value;
 }
 
 MotorModel ToMotor(const Motor& motor, const std::string& field) {
+  Check([&] {
+    RequireFields(motor, {"torque_constant", "rated_current", "peak_current", "encoder_counts"},
+                  field + ".");
+  });
   MotorModel result;
-  result.gear_ratio = Positive(motor.gear_ratio(), field + ".gear_ratio");
-  result.torque_constant = Positive(motor.torque_constant(), field + ".torque_constant");
-  result.rated_current = Positive(motor.rated_current(), field + ".rated_current");
-  result.peak_current = Positive(motor.peak_current(), field + ".peak_current");
+  result.gear_ratio = motor.gear_ratio();
+  result.torque_constant = motor.torque_constant();
+  result.rated_current = motor.rated_current();
+  result.peak_current = motor.peak_current();
   if (result.peak_current < result.rated_current) {
     throw RobotError(fmt::format("{}.peak_current {} A is below rated_current {} A: correct one",
                                  field, result.peak_current, result.rated_current));
   }
-  result.reflected_inertia = NotNegative(motor.rotor_inertia(), field + ".rotor_inertia") *
-                             motor.gear_ratio() * motor.gear_ratio();
-  if (motor.encoder_counts() <= 0) {
-    throw RobotError(
-        fmt::format("{}.encoder_counts is {}: it must be above 0", field, motor.encoder_counts()));
-  }
+  result.reflected_inertia = motor.rotor_inertia() * motor.gear_ratio() * motor.gear_ratio();
   result.encoder_counts = motor.encoder_counts();
   result.current_sensor = motor.current_sensor();
-  result.coulomb_friction = NotNegative(motor.coulomb_friction(), field + ".coulomb_friction");
-  result.viscous_friction = NotNegative(motor.viscous_friction(), field + ".viscous_friction");
-  result.static_friction = motor.has_static_friction()
-                               ? NotNegative(motor.static_friction(), field + ".static_friction")
-                               : result.coulomb_friction;
+  result.coulomb_friction = motor.coulomb_friction();
+  result.viscous_friction = motor.viscous_friction();
+  result.static_friction =
+      motor.has_static_friction() ? motor.static_friction() : result.coulomb_friction;
   if (result.static_friction < result.coulomb_friction) {
     throw RobotError(fmt::format(
         "{}.static_friction {} N m is below coulomb_friction {} N m: raise it or leave it out",
         field, result.static_friction, result.coulomb_friction));
   }
-  result.stribeck_velocity = Positive(motor.stribeck_velocity(), field + ".stribeck_velocity");
+  result.stribeck_velocity = motor.stribeck_velocity();
   if (!std::isfinite(result.reflected_inertia) || !std::isfinite(result.torque_per_ampere())) {
     throw RobotError(field + ": gear_ratio is too large to compute with: correct it");
   }
@@ -131,8 +123,9 @@ std::vector<MotorModel> LoadMotors(const Robot& description, const LinkTree& tre
 
 void LoadSole(const poise::Foot& foot, const std::string& field, FootModel* result) {
   if (foot.vertex_size() == 0) {
-    result->length = Positive(foot.length(), field + ".length");
-    result->width = Positive(foot.width(), field + ".width");
+    Check([&] { RequireFields(foot, {"length", "width"}, field + "."); });
+    result->length = foot.length();
+    result->width = foot.width();
     return;
   }
   if (foot.has_length() || foot.has_width()) {
@@ -158,7 +151,7 @@ FootModel LoadFoot(const poise::Foot& foot, const LinkTree& tree, const std::str
   if (result.name.empty()) throw RobotError(field + ".name is missing: e.g. \"right\"");
   const LinkTree::LinkPlace place = FindLink(tree, foot.link(), field + ".link");
   result.body = place.body;
-  result.sole = place.pose * ToIsometry(foot.sole(), field + ".sole");
+  result.sole = place.pose * ToIsometry(foot.sole());
   LoadSole(foot, field, &result);
   result.force_sensor = foot.force_sensor();
   int joints = 0;
@@ -219,34 +212,21 @@ StanceModel LoadStance(const Stance& stance, const LinkTree& tree) {
       throw RobotError(fmt::format("{}: the {} has no joint '{}' that moves: correct the name",
                                    field, tree.format, name));
     }
-    const double position = stance.joint(i).position();
-    if (!std::isfinite(position)) {
-      throw RobotError(fmt::format("{}.position is {}: it must be finite", field, position));
-    }
-    result.joint_position[static_cast<Eigen::Index>(j)] = position;
+    result.joint_position[static_cast<Eigen::Index>(j)] = stance.joint(i).position();
   }
-  if (stance.has_com_height()) {
-    result.com_height = Positive(stance.com_height(), "stance.com_height");
-  }
-  if (stance.has_foot_spacing()) {
-    result.foot_spacing = Positive(stance.foot_spacing(), "stance.foot_spacing");
-  }
+  if (stance.has_com_height()) result.com_height = stance.com_height();
+  if (stance.has_foot_spacing()) result.foot_spacing = stance.foot_spacing();
   return result;
 }
 
 DriveTrainModel LoadDriveTrain(const DriveTrain& drive) {
-  const auto amount = [](double value, const char* name) {
-    return NotNegative(value, fmt::format("drive_train.{}", name));
-  };
-  DriveTrainModel result;
-  result.torque_lag = amount(drive.torque_lag(), "torque_lag");
-  result.current_resolution = amount(drive.current_resolution(), "current_resolution");
-  result.backlash = amount(drive.backlash(), "backlash");
-  result.gear_stiffness = amount(drive.gear_stiffness(), "gear_stiffness");
-  result.gear_damping = amount(drive.gear_damping(), "gear_damping");
-  result.link_encoder = drive.link_encoder();
-  result.sensor_delay = amount(drive.sensor_delay(), "sensor_delay");
-  return result;
+  return {.torque_lag = drive.torque_lag(),
+          .current_resolution = drive.current_resolution(),
+          .backlash = drive.backlash(),
+          .gear_stiffness = drive.gear_stiffness(),
+          .gear_damping = drive.gear_damping(),
+          .link_encoder = drive.link_encoder(),
+          .sensor_delay = drive.sensor_delay()};
 }
 
 [[noreturn]] void FailName(const RobotSource& source, const std::string& field, const char* kind,
@@ -261,28 +241,21 @@ SourceJoint& JointOf(RobotSource* source, const std::string& field, const std::s
   return *joint;
 }
 
-double Finite(double value, const std::string& field) {
-  if (!std::isfinite(value))
-    throw RobotError(fmt::format("{} is {}: it must be finite", field, value));
-  return value;
-}
-
 void ApplyRepair(const Repair& repair, const std::string& field, RobotSource* source) {
   SourceLink* const link = source->FindLink(repair.link());
   if (link == nullptr) FailName(*source, field, "link", repair.link());
   MassProperties& mass = link->mass;
-  if (repair.has_mass()) mass.mass = NotNegative(repair.mass(), field + ".mass");
-  if (repair.has_com()) mass.com = ToIsometry(repair.com(), field + ".com").translation();
+  if (repair.has_mass()) mass.mass = repair.mass();
+  if (repair.has_com()) mass.com = ToIsometry(repair.com()).translation();
   if (repair.has_inertia()) {
     const Inertia& i = repair.inertia();
     mass.inertia << i.ixx(), i.ixy(), i.ixz(), i.ixy(), i.iyy(), i.iyz(), i.ixz(), i.iyz(), i.izz();
   }
   if (!repair.has_rotor()) return;
-  const double rotor = NotNegative(repair.rotor(), field + ".rotor");
   for (const SourceJoint& joint : source->joints) {
     if (joint.child != repair.link() || joint.kind == JointKind::kFixed) continue;
     const Eigen::Vector3d axis = joint.axis.normalized();
-    mass.inertia -= rotor * axis * axis.transpose();
+    mass.inertia -= repair.rotor() * axis * axis.transpose();
     return;
   }
   throw RobotError(
@@ -299,23 +272,22 @@ void Correct(const Robot& description, RobotSource* source) {
     const std::string field = fmt::format("limit[{}]", i);
     for (const std::string& name : limit.joint()) {
       SourceJoint& joint = JointOf(source, field, name);
-      if (limit.has_lower()) joint.lower = Finite(limit.lower(), field + ".lower");
-      if (limit.has_upper()) joint.upper = Finite(limit.upper(), field + ".upper");
-      if (limit.has_effort()) joint.effort = Positive(limit.effort(), field + ".effort");
-      if (limit.has_velocity()) joint.velocity = Positive(limit.velocity(), field + ".velocity");
+      if (limit.has_lower()) joint.lower = limit.lower();
+      if (limit.has_upper()) joint.upper = limit.upper();
+      if (limit.has_effort()) joint.effort = limit.effort();
+      if (limit.has_velocity()) joint.velocity = limit.velocity();
       joint.has_limits = true;
     }
   }
   for (int i = 0; i < description.lock_size(); ++i) {
     const std::string field = fmt::format("lock[{}]", i);
-    const double position = Finite(description.lock(i).position(), field + ".position");
     for (const std::string& name : description.lock(i).joint()) {
       SourceJoint& joint = JointOf(source, field, name);
       if (joint.kind == JointKind::kFloating || joint.kind == JointKind::kOther) {
         throw RobotError(fmt::format(
             "{}: joint '{}' is neither revolute nor prismatic: it cannot be locked", field, name));
       }
-      joint.locked = position;
+      joint.locked = description.lock(i).position();
     }
   }
 }
@@ -334,7 +306,7 @@ void Face(const Robot& description, LinkTree* tree) {
     pose.set_roll(facing.roll());
     pose.set_pitch(facing.pitch());
     pose.set_yaw(facing.yaw());
-    TurnBody(place.body, ToIsometry(pose, field).linear(), tree);
+    TurnBody(place.body, ToIsometry(pose).linear(), tree);
   }
 }
 
@@ -345,6 +317,7 @@ LinkTree MakeTree(const Robot& description, std::string_view maker_text,
   if (description.has_urdf() == description.has_mjcf() && description.has_urdf()) {
     throw RobotError("urdf and mjcf are both given: leave one out");
   }
+  Check([&] { CheckFields(description); });
   RobotSource source = description.has_mjcf() ? ReadMjcf(maker_text, warnings).source
                                               : ReadUrdf(maker_text, warnings);
   Correct(description, &source);
@@ -364,13 +337,13 @@ RobotModel MakeRobot(const Robot& description, std::string_view maker_text,
   const Imu& imu = description.imu();
   const LinkTree::LinkPlace imu_place = FindLink(tree, imu.link(), "imu.link");
   parts.imu.body = imu_place.body;
-  parts.imu.pose = imu_place.pose * ToIsometry(imu.pose(), "imu.pose");
-  parts.imu.gyro_noise = NotNegative(imu.gyro_noise(), "imu.gyro_noise");
-  parts.imu.gyro_bias = NotNegative(imu.gyro_bias(), "imu.gyro_bias");
-  parts.imu.accelerometer_noise = NotNegative(imu.accelerometer_noise(), "imu.accelerometer_noise");
-  parts.imu.accelerometer_bias = NotNegative(imu.accelerometer_bias(), "imu.accelerometer_bias");
-  parts.force_noise = NotNegative(description.force_noise(), "force_noise");
-  parts.moment_noise = NotNegative(description.moment_noise(), "moment_noise");
+  parts.imu.pose = imu_place.pose * ToIsometry(imu.pose());
+  parts.imu.gyro_noise = imu.gyro_noise();
+  parts.imu.gyro_bias = imu.gyro_bias();
+  parts.imu.accelerometer_noise = imu.accelerometer_noise();
+  parts.imu.accelerometer_bias = imu.accelerometer_bias();
+  parts.force_noise = description.force_noise();
+  parts.moment_noise = description.moment_noise();
   parts.body_task_body =
       FindLink(tree, description.has_body_link() ? description.body_link() : tree.root_link,
                "body_link")

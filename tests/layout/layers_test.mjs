@@ -18,7 +18,7 @@ const BELOW = {
   'components/framework/bus': ['lcmtypes', 'components/framework', 'components/framework/configuration'],
   'components/framework/runners': ['lcmtypes', 'components/framework', 'components/framework/configuration', 'components/framework/bus'],
   'components/robot': [],
-  'components/robot_files': ['components/robot'],
+  'components/robot_files': ['components/framework/configuration', 'components/robot'],
   'components/balance': ['components/robot'],
   'components/balance/step': ['components/robot', 'components/balance'],
   'components/balance/tasks': ['components/robot', 'components/balance'],

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "components/framework/configuration/field_rules.h"
 #include "tests/sim/simulation_fixture.h"
 
 namespace poise {
@@ -62,6 +63,7 @@ TEST_P(RefusedChange, NamesTheField) {
   try {
     const robot::RobotModel robot = PaperRobot();
     const SimConfig config = Config(GetParam().text);
+    CheckFields(config);  // as a simulation does first
     SimulatedMotors(robot, config);
     SimulatedNoise(robot, config);
     FAIL() << "accepted";

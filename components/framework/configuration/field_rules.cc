@@ -36,16 +36,13 @@ std::string Range(const FieldRule& rule) {
 
 const FieldRule& RuleOf(const FieldDescriptor& field) { return field.options().GetExtension(rule); }
 
-/// `text`: the value as it is written.
-void Check(const FieldRule& rule, double value, const std::string& text, const std::string& path) {
-  if (Allows(rule, value)) return;
-  const std::string range = Range(rule);
-  throw ConfigError(path, fmt::format("is {}; must be {}", text, range.empty() ? "finite" : range));
-}
-
 template <class Value>
 void Check(const FieldDescriptor& field, Value value, const std::string& path) {
-  Check(RuleOf(field), static_cast<double>(value), fmt::format("{}", value), path);
+  if (Allows(RuleOf(field), static_cast<double>(value))) return;
+  std::string range = RangeOf(field);
+  const bool finite = std::isfinite(static_cast<double>(value));
+  if (!finite) range = range.empty() ? "finite" : "finite and " + range;
+  throw ConfigError(path, fmt::format("is {}; must be {}", value, range));
 }
 
 /// Checks the element `i` of a list, or a single value where `i` is −1.
@@ -112,16 +109,15 @@ void CheckFields(const Message& config, const std::string& prefix) {
   }
 }
 
-void CheckPositive(double value, const std::string& field) {
-  FieldRule positive;
-  positive.set_above(0);
-  Check(positive, value, fmt::format("{}", value), field);
-}
-
-void CheckNotNegative(double value, const std::string& field) {
-  FieldRule not_negative;
-  not_negative.set_min(0);
-  Check(not_negative, value, fmt::format("{}", value), field);
+void RequireFields(const Message& config, std::initializer_list<const char*> names,
+                   const std::string& prefix) {
+  for (const char* name : names) {
+    const FieldDescriptor& field = *config.GetDescriptor()->FindFieldByName(name);
+    if (config.GetReflection()->HasField(config, &field)) continue;
+    const std::string range = RangeOf(field);
+    throw ConfigError(prefix + name, fmt::format("is missing; must be {}",
+                                                 range.empty() ? "a finite number" : range));
+  }
 }
 
 std::string RangeOf(const FieldDescriptor& field) { return Range(RuleOf(field)); }

@@ -4,6 +4,7 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/message.h>
 
+#include <initializer_list>
 #include <string>
 
 namespace poise {
@@ -13,9 +14,10 @@ namespace poise {
 /// good. `prefix`: of the paths, with its dot ("sim.").
 void CheckFields(const google::protobuf::Message& config, const std::string& prefix = "");
 
-/// Throw ConfigError in the same words for a number that stands in no message.
-void CheckPositive(double value, const std::string& field);
-void CheckNotNegative(double value, const std::string& field);
+/// Throws ConfigError with the path of the first of the fields `names` that is not set, and with
+/// what its rule allows.
+void RequireFields(const google::protobuf::Message& config,
+                   std::initializer_list<const char*> names, const std::string& prefix = "");
 
 /// What the field's rule allows: "greater than 0", "0 to 1"; empty: any number.
 std::string RangeOf(const google::protobuf::FieldDescriptor& field);
