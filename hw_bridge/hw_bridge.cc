@@ -40,11 +40,6 @@ SupervisorConfig MakeSupervisorConfig(const HwBridgeConfig& config, const robot:
                       "torque_constant and a peak_current above 0",
                       joint.name, limit));
     }
-    if (motor.encoder_counts <= 0) {
-      throw ConfigError(fmt::format(
-          "joint \"{}\": its motor has no encoder_counts; give counts per motor revolution above 0",
-          joint.name));
-    }
     result.torque_limit.push_back(limit);
     result.lower.push_back(joint.lower);
     result.upper.push_back(joint.upper);

@@ -25,15 +25,6 @@ constexpr int kMostFrames = 64;                    // answered in one go
 // Less than the drives' watchdog, more than anything they take to do.
 constexpr int64_t kPatience = 20 * kMillisecond;
 
-std::unique_ptr<ethercat::SocketLink> OpenSlavesLink(const ethercat::LinkConfig& config) {
-  if (config.has_interface()) {
-    return std::make_unique<ethercat::RawLink>(config.interface(),
-                                               ethercat::RawLink::Side::kSlaves);
-  }
-  return ethercat::UdpLink::Listen(
-      {.address = config.udp().address(), .port = static_cast<uint16_t>(config.udp().port())});
-}
-
 size_t FindJoint(const robot::RobotModel& model, const std::string& name,
                  const std::string& field) {
   const int joint = model.FindJoint(name);
@@ -80,13 +71,7 @@ void DriveEmulator::Configure(const ComponentContext& context, Wiring* wiring) {
   const auto config = context.config<DriveEmulatorConfig>();
   const std::shared_ptr<const robot::RobotModel> model = LoadRobot(context);
   link_config_ = config.link();
-  if (link_config_.has_udp() == link_config_.has_interface()) {
-    throw ConfigError("link", "must be either udp or interface");
-  }
-  if (link_config_.has_udp() &&
-      (link_config_.udp().port() == 0 || link_config_.udp().port() > 0xFFFF)) {
-    throw ConfigError("link.udp.port", "must be between 1 and 65535");
-  }
+  ethercat::CheckLink(link_config_);
   simulated_time_ = config.simulated_time();
   period_seconds_ = context.tick_period;
   period_ = std::llround(context.tick_period * 1e9);
@@ -105,12 +90,6 @@ void DriveEmulator::Configure(const ComponentContext& context, Wiring* wiring) {
     }
     joint_.push_back(joint);
     const robot::MotorModel& motor = model->motors()[joint];
-    if (!(motor.rated_current > 0) || !(motor.torque_constant > 0) || motor.encoder_counts <= 0) {
-      throw ConfigError(
-          fmt::format("joint \"{}\": its motor must have a rated_current, a "
-                      "torque_constant and encoder_counts in the robot's file",
-                      drives[i].joint()));
-    }
     ethercat::EmulatedDriveConfig& drive = *chain.add_drive();
     drive = config.drive();
     drive.set_serial(static_cast<uint32_t>(i + 1));
@@ -153,7 +132,7 @@ void DriveEmulator::Configure(const ComponentContext& context, Wiring* wiring) {
 }
 
 void DriveEmulator::Open() {
-  socket_ = OpenSlavesLink(link_config_);
+  socket_ = ethercat::OpenSlavesLink(link_config_);
   clock_offset_ = -socket_->Now();
 }
 

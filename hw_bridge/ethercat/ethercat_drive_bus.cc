@@ -14,10 +14,6 @@ namespace poise::ethercat {
 namespace {
 
 const EthercatBusConfig& Checked(const EthercatBusConfig& config) {
-  if (config.most_bad_in_a_row() < 1 || config.most_bad_in_100() < 1) {
-    throw EthercatError(
-        "EtherCAT configuration: most_bad_in_a_row and most_bad_in_100 must be at least 1");
-  }
   if (!config.simulated_time() && int64_t{config.input_wait()} * 1000 >= config.master().cycle()) {
     throw EthercatError("EtherCAT configuration: input_wait must be less than a cycle");
   }
@@ -72,11 +68,11 @@ MasterConfig CompleteMasterConfig(MasterConfig config, const robot::RobotModel& 
     const robot::MotorModel& motor = model.motors()[static_cast<size_t>(joint)];
     const double current = motor.rated_current * 1e3;                         // mA
     const double torque = motor.torque_constant * motor.rated_current * 1e3;  // mN·m
-    if (!(current >= 1) || !(torque >= 1) || motor.encoder_counts <= 0) {
-      throw EthercatError(
-          fmt::format("joint \"{}\": its motor needs a rated_current, a torque_constant and "
-                      "encoder_counts above 0 in the robot's description",
-                      drive.joint()));
+    if (!(current >= 1) || !(torque >= 1)) {
+      throw EthercatError(fmt::format(
+          "joint \"{}\": its motor needs a rated_current of at least 1 mA, and a "
+          "torque_constant that makes at least 1 mN·m of it, in the robot's description",
+          drive.joint()));
     }
     if (!drive.has_rated_current()) {
       drive.set_rated_current(static_cast<uint32_t>(std::lround(current)));
@@ -154,11 +150,11 @@ void EthercatDriveBus::FindReadings(const MasterConfig& config, size_t num_feet)
                                                    static_cast<uint8_t>(reading.subindex()));
       const bool of_foot =
           reading.quantity() == SensorReading::FORCE || reading.quantity() == SensorReading::MOMENT;
-      if (!place || reading.axis() > 2 || (of_foot && reading.foot() >= num_feet) ||
+      if (!place || (of_foot && reading.foot() >= num_feet) ||
           (reading.is_float() && place->bits != 32)) {
         throw EthercatError(fmt::format(
             "EtherCAT configuration: other \"{}\": reading of {:04X}:{:02X}: give an object of its "
-            "tx, an axis of 0 to 2, and a foot of the robot; is_float takes 32 bits",
+            "tx, and a foot of the robot; is_float takes 32 bits",
             config.other(i).name(), reading.index(), reading.subindex()));
       }
       (of_foot ? sensors_.feet : sensors_.imu) = true;

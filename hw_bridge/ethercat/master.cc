@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "components/framework/configuration/field_rules.h"
+
 namespace poise::ethercat {
 namespace {
 
@@ -12,6 +14,7 @@ constexpr uint16_t kFirstStation = 1001;  // 0 is the address of a slave that ha
 constexpr uint16_t kEventMask = 0x0004;   // AL events in each datagram, as other masters set it
 
 const MasterConfig& Checked(const MasterConfig& config) {
+  CheckFields(config, "master.");
   const auto require = [](bool condition, std::string_view problem) {
     if (!condition) throw EthercatError(fmt::format("EtherCAT configuration: {}", problem));
   };
@@ -20,28 +23,9 @@ const MasterConfig& Checked(const MasterConfig& config) {
               std::all_of(config.drive().begin(), config.drive().end(), own_profile),
           "profile is missing: which drives are on the bus?");
   require(config.drive_size() > 0, "drive is missing: name each drive of the chain");
-  require(config.cycle() >= 100'000 && config.cycle() <= 100'000'000,
-          "cycle must be between 100000 and 100000000 ns");
-  require(config.watchdog() >= 1 && config.watchdog() <= 6000,
-          "watchdog must be between 1 and 6000 ms");
-  require(config.attempts() >= 1 && config.attempts() <= 100, "attempts must be 1 to 100");
-  require(config.frame_timeout() >= 1 && config.frame_timeout() <= 60'000 &&
-              config.eeprom_timeout() >= 1 && config.eeprom_timeout() <= 60'000 &&
-              config.mailbox_timeout() >= 1 && config.mailbox_timeout() <= 60'000 &&
-              config.state_timeout() >= 1 && config.state_timeout() <= 60'000,
-          "timeouts must be between 1 and 60000 ms");
-  require(config.drift_frames() <= 100'000, "drift_frames must be at most 100000");
   require(
       static_cast<uint32_t>(std::abs(static_cast<int64_t>(config.sync0_shift()))) < config.cycle(),
       "sync0_shift must be less than a cycle");
-  for (const DriveConfig& drive : config.drive()) {
-    if (drive.rated_torque() == 0 || drive.rated_current() == 0) {
-      throw EthercatError(fmt::format(
-          "EtherCAT configuration: drive \"{}\": rated_torque (mN·m) and rated_current (mA) must "
-          "be above 0",
-          drive.joint()));
-    }
-  }
   return config;
 }
 

@@ -10,8 +10,6 @@
 namespace poise::ethercat {
 namespace {
 
-constexpr uint32_t kMostBits = 64;
-
 /// Bits of the objects that the bridge knows, by CiA 402; 0: any.
 int StandardBits(uint16_t index) {
   switch (index) {
@@ -68,15 +66,12 @@ ProcessImage::Direction ProcessImage::MakeDirection(const DriveProfile& profile,
     const auto index = static_cast<uint16_t>(object.index());
     const int standard = StandardBits(index);
     const bool aligned = standard == 0 || direction.bits % 8 == 0;
-    if (object.index() > 0xFFFF || object.subindex() > 0xFF || object.bits() == 0 ||
-        object.bits() > kMostBits || !aligned ||
-        (standard != 0 && static_cast<int>(object.bits()) != standard)) {
+    if (!aligned || (standard != 0 && static_cast<int>(object.bits()) != standard)) {
       throw EthercatError(
           fmt::format("drive profile \"{}\": object {:04X}:{:02X} of {} bits cannot be mapped{}",
                       profile.name(), object.index(), object.subindex(), object.bits(),
-                      !aligned        ? "; it must begin with a byte"
-                      : standard != 0 ? fmt::format("; CiA 402 gives it {}", standard)
-                                      : "; give 1 to 64 bits"));
+                      aligned ? fmt::format("; CiA 402 gives it {}", standard)
+                              : "; it must begin with a byte"));
     }
     const auto own = static_cast<uint16_t>(pdo);
     if (direction.pdos.empty() || direction.pdos.back() != own) direction.pdos.push_back(own);

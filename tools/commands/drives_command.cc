@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_rules.h"
 #include "hw_bridge/ethercat/emulator/rotor_chain.h"
 #include "hw_bridge/ethercat/links/socket_link.h"
 #include "tools/cli/cli_checks.h"
@@ -49,20 +50,12 @@ ethercat::LinkConfig ParseLink(const std::string& text) {
   }
   uint32_t port = 0;
   const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), port);
-  if (error != std::errc() || end != rest.data() + rest.size() || port == 0 || port > 0xFFFF) {
-    throw ConfigError(fmt::format("--link {}: the port must be 1 to 65535", text));
+  if (error != std::errc() || end != rest.data() + rest.size()) {
+    throw ConfigError(fmt::format("--link {}: the port is no number", text));
   }
   link.mutable_udp()->set_port(port);
+  CheckFields(link, fmt::format("--link {}: ", text));
   return link;
-}
-
-std::unique_ptr<ethercat::SocketLink> OpenSlaves(const ethercat::LinkConfig& config) {
-  if (config.has_interface()) {
-    return std::make_unique<ethercat::RawLink>(config.interface(),
-                                               ethercat::RawLink::Side::kSlaves);
-  }
-  return ethercat::UdpLink::Listen(
-      {.address = config.udp().address(), .port = static_cast<uint16_t>(config.udp().port())});
 }
 
 ethercat::EmulatedChainConfig ChainOf(const DrivesOptions& options) {
@@ -106,7 +99,7 @@ void ShowDrives(ethercat::RotorChain* drives, int64_t frames, double seconds) {
 
 int Emulate(const DrivesOptions& options) {
   CatchStopSignals();
-  const auto link = OpenSlaves(ParseLink(options.link));
+  const auto link = ethercat::OpenSlavesLink(ParseLink(options.link));
   ethercat::RotorChain drives(ChainOf(options), options.inertia, options.damping);
   fmt::print("{} drives of type {} on {}; Ctrl-C ends them\n", options.count, options.profile,
              options.link);

@@ -15,6 +15,8 @@
 #include <memory>
 
 #include "components/framework/clock.h"
+#include "components/framework/configuration/config_error.h"
+#include "components/framework/configuration/field_rules.h"
 
 namespace poise::ethercat {
 namespace {
@@ -31,6 +33,10 @@ sockaddr_in Address(const UdpLink::Endpoint& endpoint) {
                     endpoint.address));
   }
   return address;
+}
+
+UdpLink::Endpoint EndpointOf(const UdpConfig& config) {
+  return {.address = config.address(), .port = static_cast<uint16_t>(config.port())};
 }
 
 }  // namespace
@@ -182,18 +188,23 @@ size_t RawLink::Receive(std::span<uint8_t> frame, int64_t deadline) {
   return 0;
 }
 
-std::unique_ptr<Link> OpenLink(const LinkConfig& config) {
+void CheckLink(const LinkConfig& config) {
+  CheckFields(config, "link.");
   if (config.has_udp() == config.has_interface()) {
-    throw EthercatError("EtherCAT configuration: link: give either udp or interface");
+    throw ConfigError("link", "must be either udp or interface");
   }
-  if (config.has_interface()) {
-    return std::make_unique<RawLink>(config.interface(), RawLink::Side::kMaster);
-  }
-  if (config.udp().port() == 0 || config.udp().port() > 0xFFFF) {
-    throw EthercatError("EtherCAT configuration: link.udp.port must be between 1 and 65535");
-  }
-  return UdpLink::Connect(
-      {.address = config.udp().address(), .port = static_cast<uint16_t>(config.udp().port())});
+}
+
+std::unique_ptr<Link> OpenLink(const LinkConfig& config) {
+  CheckLink(config);
+  if (config.has_udp()) return UdpLink::Connect(EndpointOf(config.udp()));
+  return std::make_unique<RawLink>(config.interface(), RawLink::Side::kMaster);
+}
+
+std::unique_ptr<SocketLink> OpenSlavesLink(const LinkConfig& config) {
+  CheckLink(config);
+  if (config.has_udp()) return UdpLink::Listen(EndpointOf(config.udp()));
+  return std::make_unique<RawLink>(config.interface(), RawLink::Side::kSlaves);
 }
 
 }  // namespace poise::ethercat

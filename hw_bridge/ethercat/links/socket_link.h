@@ -77,8 +77,13 @@ class RawLink final : public SocketLink {
   std::array<uint8_t, kEthernetHeader + kMaxFrame + 1> in_{};
 };
 
-/// The master's side of the configured link. Throws EthercatError: not exactly one kind is set, or
-/// it cannot be opened.
+/// Throws ConfigError "link...": not exactly one kind is set, or a number breaks its rule.
+void CheckLink(const LinkConfig& config);
+
+/// The master's side of the configured link. Throws ConfigError as CheckLink, and EthercatError: it
+/// cannot be opened.
 std::unique_ptr<Link> OpenLink(const LinkConfig& config);
+/// The slaves' side, likewise.
+std::unique_ptr<SocketLink> OpenSlavesLink(const LinkConfig& config);
 
 }  // namespace poise::ethercat

@@ -110,12 +110,15 @@ struct Bench {
   std::vector<DriveControl> controls;
 };
 
-/// The message of the EthercatError that `action` throws; empty when it throws none.
+/// The message of the EthercatError, or of the ConfigError, that `action` throws; empty when it
+/// throws none.
 template <class Action>
 std::string ErrorOf(Action action) {
   try {
     action();
   } catch (const EthercatError& error) {
+    return error.what();
+  } catch (const ConfigError& error) {
     return error.what();
   }
   return "";

@@ -111,9 +111,10 @@ TEST(EthercatMaster, RefusesAConfigurationThatCannotWork) {
   EXPECT_THAT(error([](Bench& b) { b.master_config.clear_drive(); }),
               HasSubstr("drive is missing"));
   EXPECT_THAT(error([](Bench& b) { b.master_config.clear_profile(); }), HasSubstr("profile"));
-  EXPECT_THAT(error([](Bench& b) { b.master_config.set_cycle(0); }), HasSubstr("cycle"));
+  EXPECT_THAT(error([](Bench& b) { b.master_config.set_cycle(0); }),
+              HasSubstr("master.cycle: is 0"));
   EXPECT_THAT(error([](Bench& b) { b.master_config.mutable_drive(0)->set_rated_torque(0); }),
-              HasSubstr("joint_0"));
+              HasSubstr("master.drive[0].rated_torque: is 0"));
   EXPECT_THAT(error([](Bench& b) { b.master_config.mutable_profile()->set_tx_pdo(0x1600); }),
               HasSubstr("tx_pdo 0x1600"));
   EXPECT_THAT(
