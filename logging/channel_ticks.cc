@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "components/framework/graph.h"
 #include "components/framework/modules.h"
 #include "fmt/format.h"
 #include "logging/run_log_writer.h"
@@ -13,8 +14,6 @@ namespace {
 // A tick beyond this is damage, not a run: 5 hours at 500 Hz.
 constexpr int64_t kMaxTicks = 10'000'000;
 constexpr int64_t kMinRecordSize = 29;  // bytes, of an event's header and a channel's name
-constexpr double kMaxTickPeriod = 10;   // s
-constexpr int32_t kMaxCount = 4096;     // as for ports
 
 PacketFilter MakeFilter(const RunSpec& spec, const Channel& channel) {
   const MessageType& type = ChannelType(channel);
@@ -25,18 +24,13 @@ PacketFilter MakeFilter(const RunSpec& spec, const Channel& channel) {
 }  // namespace
 
 void CheckLogSpec(const RunSpec& spec, const std::string& path) {
-  const double period = spec.tick_period();
-  if (!(period > 0 && period <= kMaxTickPeriod)) {
-    throw LogError(
-        fmt::format("{}: RUN_INFO: tick_period is {} s; must be above 0 and at most {} s", path,
-                    period, kMaxTickPeriod));
+  try {
+    CheckRun(spec, path + ": RUN_INFO: ");
+  } catch (const ConfigError& error) {
+    throw LogError(error.what());
   }
-  if (spec.num_ticks() < 0) {
-    throw LogError(
-        fmt::format("{}: RUN_INFO: num_ticks is {}; must not be negative", path, spec.num_ticks()));
-  }
-  if (spec.has_cut() && (spec.cut().first_tick() < 0 || spec.cut().first_tick() >= kMaxTicks ||
-                         spec.cut().last_tick() < spec.cut().first_tick())) {
+  if (spec.has_cut() &&
+      (spec.cut().first_tick() >= kMaxTicks || spec.cut().last_tick() < spec.cut().first_tick())) {
     throw LogError(fmt::format("{}: RUN_INFO: cut: ticks {} to {} are none", path,
                                spec.cut().first_tick(), spec.cut().last_tick()));
   }

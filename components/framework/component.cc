@@ -14,9 +14,9 @@ void CheckCounts(std::string_view direction, const std::string& name,
                                   count_names.size(), counts.size()));
   }
   for (size_t i = 0; i < counts.size(); ++i) {
-    if (counts[i] < 0 || counts[i] > 4096) {
-      throw ConfigError(fmt::format("{} {}: {} = {} is outside 0 to 4096", direction, name,
-                                    count_names[i], counts[i]));
+    if (counts[i] < 0 || counts[i] > kMaxCount) {
+      throw ConfigError(fmt::format("{} {}: {} = {} is outside 0 to {}", direction, name,
+                                    count_names[i], counts[i], kMaxCount));
     }
   }
 }

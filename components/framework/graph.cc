@@ -6,6 +6,7 @@
 #include <iterator>
 #include <set>
 
+#include "components/framework/configuration/field_rules.h"
 #include "components/framework/graph_order.h"
 #include "components/framework/modules.h"
 #include "components/framework/operator_acts.h"
@@ -490,6 +491,11 @@ void FillPlan(const GraphPlan& plan, Graph* graph) {
   }
 }
 
+void CheckRun(const RunSpec& spec, const std::string& prefix) {
+  RequireFields(spec, {"tick_period"}, prefix);
+  CheckFields(spec, prefix);
+}
+
 ConfiguredComponent ConfigureComponent(const RunSpec& spec, int index,
                                        const ComponentFactory& factory, SharedObjects* shared) {
   ConfiguredComponent result;
@@ -524,7 +530,7 @@ ConfiguredComponent ConfigureComponent(const RunSpec& spec, int index,
 
 BoundGraph::BoundGraph(const RunSpec& spec, const ComponentRegistry& registry,
                        std::atomic<int>* configuring) {
-  if (!(spec.tick_period() > 0)) throw ConfigError("run: tick_period must be greater than 0");
+  CheckRun(spec);
   CheckGraph(spec.graph(), registry);
   std::vector<const Wiring*> wirings;
   for (int i = 0; i < spec.graph().component_size(); ++i) {

@@ -73,6 +73,9 @@ GraphPlan PlanGraph(const Graph& graph, const std::vector<const Wiring*>& wiring
 /// (Channel.count), and the order of the stages of components that share a process (stage_place).
 void FillPlan(const GraphPlan& plan, Graph* graph);
 
+/// Holds the run's own numbers to their rules. Throws ConfigError, with `prefix` before the field.
+void CheckRun(const RunSpec& spec, const std::string& prefix = "run: ");
+
 /// One configured component of a run.
 struct ConfiguredComponent {
   int index = -1;  ///< in the graph

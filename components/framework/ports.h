@@ -24,6 +24,7 @@ enum class InputKind {
 /// Values of a message type's leading count fields (e.g. {num_joints, num_feet}), in their order.
 /// Fixed for the life of a port, so that every message on it has one exact encoded size.
 using MessageCounts = std::vector<int32_t>;
+inline constexpr int32_t kMaxCount = 4096;  ///< of each
 
 /// Type-erased input: what a runner needs. Not for components.
 class InputPort {

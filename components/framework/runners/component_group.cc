@@ -9,6 +9,7 @@ namespace poise {
 
 ComponentGroup::ComponentGroup(const RunSpec& spec, std::string_view process,
                                const ComponentRegistry& registry) {
+  CheckRun(spec);
   const Graph& graph = spec.graph();
   const std::vector<int> members = ComponentsOf(graph, process);
   if (members.empty()) {

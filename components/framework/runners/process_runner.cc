@@ -129,7 +129,6 @@ ProcessRunner::Impl::Impl(const RunSpec& spec, const std::string& process,
       bus_(spec, options.socket != nullptr ? *options.socket : asked_.emplace(RunSocket::Ask(spec)),
            process, &group_.components(), JoinOf(timing_), options.take_over == nullptr),
       latency_(group_.components().size()) {
-  if (!(period_ > 0)) throw ConfigError("run: tick_period must be greater than 0");
   CheckTiming(spec, process);
   if (!options_.state_path.empty()) {
     store_ = std::make_unique<StateStore>(options_.state_path);
