@@ -7,6 +7,7 @@
 
 #include "components/framework/configuration/added_fields.h"
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_rules.h"
 #include "components/framework/run.h"
 #include "components/robot/dynamics.h"
 #include "components/robot/sole.h"
@@ -75,7 +76,12 @@ void CheckSet(const Benchmark& benchmark, const std::string& file) {
     if (part.scenario().has_graph() || part.scenario().has_robot() || part.sweep().has_scenario()) {
       fail(where + ": graph, robot and the sweep's scenario are not the set's");
     }
-    if (part.quick() < 1) fail(where + ": quick must be 1 or more");
+    try {
+      RequireFields(part, {"quick"}, where + ": ");
+      CheckFields(part, where + ": ");
+    } catch (const ConfigError& error) {
+      fail(error.what());
+    }
   }
 }
 

@@ -9,6 +9,7 @@
 #include "components/framework/configuration/added_fields.h"
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_path.h"
+#include "components/framework/configuration/field_rules.h"
 #include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
 #include "logging/metrics/metrics.h"
@@ -22,9 +23,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kMaxLead = 60;     // s
-constexpr double kMinRate = 50;     // Hz
-constexpr double kMaxRate = 10000;  // Hz
 constexpr char kSetFlag[] = "--set";
 constexpr char kRobotFlag[] = "--robot";
 
@@ -107,17 +105,12 @@ void CheckScenario(const LoadedScenario& loaded) {
     fail("name", problem);
   }
   if (!s.has_robot()) fail("robot", "is missing; name one of deploy/robots");
-  if (!(s.duration() > 0) || s.duration() > 36000) {
-    fail("duration", fmt::format("is {} s; must be in (0, 36000]", s.duration()));
+  try {
+    RequireFields(s, {"duration"});
+    CheckFields(s);
+  } catch (const ConfigError& error) {
+    fail(error.field(), error.problem());
   }
-  if (!(s.tick_rate() >= kMinRate && s.tick_rate() <= kMaxRate)) {
-    fail("tick_rate",
-         fmt::format("is {} Hz; must be in [{}, {}]", s.tick_rate(), kMinRate, kMaxRate));
-  }
-  if (!(s.lead() >= 0 && s.lead() <= kMaxLead)) {
-    fail("lead", fmt::format("is {} s; must be in [0, {}]", s.lead(), kMaxLead));
-  }
-  if (!(s.check_from() >= 0)) fail("check_from", "must be in [0, duration)");
   if (!(s.check_from() < s.duration())) {
     const auto changed = [&](const char* field) {
       return std::any_of(
@@ -135,13 +128,6 @@ void CheckScenario(const LoadedScenario& loaded) {
     if (logging::FindMetric(s.check(i).metric()) == nullptr) {
       fail(fmt::format("check[{}].metric", i), logging::NoMetric(s.check(i).metric()));
     }
-    const auto check_finite = [&](const char* field, double value) {
-      if (std::isfinite(value)) return;
-      fail(fmt::format("check[{}].{}", i, field), fmt::format("is {}; must be finite", value));
-    };
-    check_finite("at_most", s.check(i).at_most());
-    check_finite("at_least", s.check(i).at_least());
-    check_finite("paper_value", s.check(i).paper_value());
     if (s.check(i).has_at_most() && s.check(i).has_at_least() &&
         s.check(i).at_most() < s.check(i).at_least()) {
       FailLimits(loaded, i);

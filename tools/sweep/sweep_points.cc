@@ -5,6 +5,7 @@
 #include <set>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_rules.h"
 #include "fmt/format.h"
 #include "sim/random.h"
 #include "tools/sweep/sweep_expression.h"
@@ -57,9 +58,6 @@ std::optional<SweepProblem> CheckVariable(const Variable& v, const std::string& 
   const bool range = v.has_from() || v.has_to();
   const int kinds = (range ? 1 : 0) + (v.value_size() > 0 ? 1 : 0) + (v.choice_size() > 0 ? 1 : 0);
   if (kinds != 1) return SweepProblem{path, "needs either from and to, or value, or choice"};
-  for (const double number : v.value()) {
-    if (!std::isfinite(number)) return SweepProblem{path + ".value", "must be finite"};
-  }
   std::set<std::string> names;
   for (int i = 0; i < v.choice_size(); ++i) {
     const std::string field = fmt::format("{}.choice[{}]", path, i);
@@ -76,12 +74,7 @@ std::optional<SweepProblem> CheckVariable(const Variable& v, const std::string& 
     if (v.has_steps()) return SweepProblem{path + ".steps", "goes with from and to"};
     return {};
   }
-  if (!std::isfinite(v.from()) || !v.has_from()) {
-    return SweepProblem{path + ".from", "must be a finite number"};
-  }
-  if (!std::isfinite(v.to()) || !v.has_to()) {
-    return SweepProblem{path + ".to", "must be a finite number"};
-  }
+  RequireFields(v, {"from", "to"}, path + ".");
   if (v.scale() == Variable::LOGARITHMIC && !(v.from() > 0 && v.to() > 0)) {
     return SweepProblem{path + ".scale", "is logarithmic: from and to must be more than 0"};
   }
@@ -89,11 +82,7 @@ std::optional<SweepProblem> CheckVariable(const Variable& v, const std::string& 
     if (v.has_steps()) return SweepProblem{path + ".steps", "is of a grid; this sweep is random"};
     return {};
   }
-  if (!v.has_steps()) return SweepProblem{path + ".steps", "is missing: how many values"};
-  if (v.steps() < 1 || v.steps() > kMaxSweepRuns) {
-    return SweepProblem{path + ".steps",
-                        fmt::format("is {}; must be 1 to {}", v.steps(), kMaxSweepRuns)};
-  }
+  RequireFields(v, {"steps"}, path + ".");
   return {};
 }
 
@@ -101,18 +90,10 @@ std::optional<SweepProblem> CheckLimit(const Limit& limit) {
   if (auto problem = CheckName("limit", limit.has_name(), limit.name(), limit.field())) {
     return problem;
   }
-  if (!limit.has_min() || !std::isfinite(limit.min())) {
-    return SweepProblem{"limit.min", "must be a finite number"};
-  }
-  if (!limit.has_max() || !std::isfinite(limit.max())) {
-    return SweepProblem{"limit.max", "must be a finite number"};
-  }
+  RequireFields(limit, {"min", "max"}, "limit.");
   if (!(limit.max() > limit.min())) return SweepProblem{"limit.max", "must be more than min"};
-  if (limit.samples() < 2 || limit.samples() > 10000) {
-    return SweepProblem{"limit.samples", fmt::format("is {}; must be 2 to 10000", limit.samples())};
-  }
-  if (limit.has_cap() && !(std::isfinite(limit.cap()) && limit.cap() >= limit.max())) {
-    return SweepProblem{"limit.cap", "must be finite, and max or more"};
+  if (limit.has_cap() && limit.cap() < limit.max()) {
+    return SweepProblem{"limit.cap", "must be max or more"};
   }
   const double range = limit.max() - limit.min();
   if (limit.has_tolerance() && !(limit.tolerance() >= 1e-9 * range && limit.tolerance() <= range)) {
@@ -214,14 +195,21 @@ std::vector<std::string> SweepPoints::Changes(int64_t run,
   return changes;
 }
 
-std::optional<SweepProblem> CheckVariables(const Sweep& sweep, bool limit) {
-  if (sweep.has_random() && (sweep.random() < 1 || sweep.random() > kMaxSweepRuns)) {
-    return SweepProblem{"random",
-                        fmt::format("is {}; must be 1 to {}", sweep.random(), kMaxSweepRuns)};
+namespace {
+
+/// Every single number has been held to its rule.
+std::optional<SweepProblem> VariablesProblem(const Sweep& sweep, bool limit) {
+  double runs = sweep.has_random() ? static_cast<double>(sweep.random()) : 1;
+  for (const Variable& v : sweep.vary()) {
+    if (!sweep.has_random())
+      runs *= v.choice_size() + v.value_size() + static_cast<double>(v.steps());
+  }
+  if (runs > static_cast<double>(kMaxSweepRuns)) {
+    return SweepProblem{sweep.has_random() ? "random" : "vary",
+                        fmt::format("makes {:g} runs; at most {}", runs, kMaxSweepRuns)};
   }
   std::map<std::string, double> numbers;
   std::set<std::string> names;
-  double runs = 1;
   for (int i = 0; i < sweep.constant_size(); ++i) {
     const Constant& constant = sweep.constant(i);
     const std::string path = fmt::format("constant[{}].", i);
@@ -231,9 +219,7 @@ std::optional<SweepProblem> CheckVariables(const Sweep& sweep, bool limit) {
                                       "function or constant",
                                       constant.name())};
     }
-    if (!constant.has_value() || !std::isfinite(constant.value())) {
-      return SweepProblem{path + "value", "must be a finite number"};
-    }
+    RequireFields(constant, {"value"}, path);
     if (!names.insert(constant.name()).second) {
       return SweepProblem{path + "name",
                           fmt::format("is '{}', as another constant's is", constant.name())};
@@ -254,13 +240,9 @@ std::optional<SweepProblem> CheckVariables(const Sweep& sweep, bool limit) {
       if (sweep.has_random()) alone.set_random(1);
       return alone;
     }());
-    runs *= static_cast<double>(one.size());
     if (v.choice_size() == 0 && IsExpressionName(NameOf(v))) {
       numbers[NameOf(v)] = one.At(0)[0].number;
     }
-  }
-  if (runs > static_cast<double>(kMaxSweepRuns)) {
-    return SweepProblem{"vary", fmt::format("makes {:g} runs; at most {}", runs, kMaxSweepRuns)};
   }
   if (limit) {
     if (auto problem = CheckLimit(sweep.limit())) return problem;
@@ -285,6 +267,17 @@ std::optional<SweepProblem> CheckVariables(const Sweep& sweep, bool limit) {
     }
   }
   return {};
+}
+
+}  // namespace
+
+std::optional<SweepProblem> CheckVariables(const Sweep& sweep, bool limit) {
+  try {
+    CheckFields(sweep);
+    return VariablesProblem(sweep, limit);
+  } catch (const ConfigError& error) {
+    return SweepProblem{error.field(), error.problem()};
+  }
 }
 
 }  // namespace poise

@@ -199,12 +199,14 @@ TEST(SweepPoints, NamesTheFieldThatIsWrong) {
   starts("vary { name: 'a' from: 0 to: 1 steps: 0 }", "vary[0].steps");
   starts("vary { name: 'a' from: 0 steps: 2 }", "vary[0].to");
   starts("vary { name: 'a' from: nan to: 1 steps: 2 }", "vary[0].from");
-  starts("vary { name: 'a' value: inf }", "vary[0].value");
+  starts("vary { name: 'a' value: inf }", "vary[0].value[0]");
   starts("vary { name: 'a' from: 0 to: 1 steps: 2 scale: LOGARITHMIC }", "vary[0].scale");
   starts("vary { name: 'a' from: 0 to: 1 steps: 2 value: 3 }", "vary[0]");
   starts("vary { name: 'a' value: 3 steps: 2 }", "vary[0].steps");
   starts("random: 5 vary { name: 'a' from: 0 to: 1 steps: 2 }", "vary[0].steps");
   starts("random: 0 vary { name: 'a' from: 0 to: 1 }", "random");
+  starts("random: 1000001 vary { name: 'a' from: 0 to: 1 }", "random");
+  starts("vary { name: 'a' from: 0 to: 1 steps: 2147483647 }", "vary");
   starts("vary { name: 'a' value: 1 } vary { name: 'a' value: 2 }", "vary[1]");
   starts("vary { name: 'a' choice { set: 'x=1' } }", "vary[0].choice[0]");
   starts("vary { name: 'a' field: 'b' choice { name: 'x' } }", "vary[0].field");
