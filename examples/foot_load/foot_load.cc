@@ -14,9 +14,6 @@ namespace gait_lab {
 
 void FootLoad::Configure(const poise::ComponentContext& context, poise::Wiring* wiring) {
   const auto config = context.config<FootLoadConfig>();
-  if (!(config.time_constant() >= 0)) {
-    throw poise::ConfigError("time_constant", "must be a time in s, 0 or more");
-  }
   gain_ =
       config.time_constant() > 0 ? 1 - std::exp(-context.tick_period / config.time_constant()) : 1;
   const auto model = poise::LoadRobot(context);

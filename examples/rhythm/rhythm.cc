@@ -19,7 +19,6 @@ class Rhythm : public poise::Component {
  public:
   void Configure(const poise::ComponentContext& context, poise::Wiring* wiring) override {
     const auto config = context.config<RhythmConfig>();
-    if (!(config.period() > 0)) throw poise::ConfigError("period", "must be a time in s, above 0");
     const auto model = poise::LoadRobot(context);
     wiring->AddInput(&robot_state_, "robot_state", poise::JointAndFootCounts(*model));
     wiring->AddOutput(&stride_, "stride", {});

@@ -119,7 +119,7 @@ test('the numbers are right', () => {
 test('a setting of hers is set, and refused, like any', () => {
   const slow = poise(['run', 'watch_load', '--inline', '--set', 'foot_load.time_constant=0.5', '--out', join(folder, 'slow')]);
   assert.match(slow, /--set: foot_load\.time_constant=0\.5/);
-  assert.match(poise(['run', 'watch_load', '--set', 'foot_load.time_constant=-1'], {exit: 2}), /foot_load\.time_constant: must be a time/);
+  assert.match(poise(['run', 'watch_load', '--set', 'foot_load.time_constant=-1'], {exit: 2}), /foot_load\.time_constant: is -1; must be 0 or more/);
   assert.match(poise(['run', 'watch_load', '--set', 'foot_load.time_konstant=1'], {exit: 2}), /did you mean.*time_constant/);
 });
 
