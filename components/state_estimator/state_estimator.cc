@@ -20,18 +20,18 @@ using Eigen::Vector3d;
 using robot::Foot;
 using robot::kFeet;
 
-constexpr double kStepCutoff = 60;      // Hz: G1 stands fewer pushes with 80 (docs/lab/steps)
-constexpr double kLongestDelay = 0.05;  // s
+constexpr double kStepCutoff = 60;  // Hz: G1 stands fewer pushes with 80 (docs/lab/steps)
 
-void CheckConfig(const StateEstimatorConfig& config, const robot::RobotModel& model) {
+void CheckConfig(StateEstimatorConfig config, const robot::RobotModel& model) {
   if (config.full_load() <= config.light_load()) {
     throw ConfigError("full_load", "must be greater than light_load");
   }
-  if (!config.invariant_ekf().has_sensor_delay() &&
-      model.drive_train().sensor_delay > kLongestDelay) {
-    throw ConfigError("invariant_ekf.sensor_delay",
-                      "must be at most 0.05 s, and the robot file's is longer: the motion is not "
-                      "known further ahead");
+  if (config.invariant_ekf().has_sensor_delay()) return;
+  config.mutable_invariant_ekf()->set_sensor_delay(model.drive_train().sensor_delay);
+  try {
+    CheckFields(config);
+  } catch (const ConfigError& error) {
+    throw ConfigError(error.field(), error.problem() + ", and it is the robot file's");
   }
 }
 

@@ -155,9 +155,9 @@ void CheckArrow(const StepPlannerConfig& config, const PhaseGraph& graph,
 // off by as much.
 constexpr double kLengthMargin = 0.03, kWidthMargin = 0.025;
 
-// Shares of touch_load below which contact is lost, so that it does not flicker, and at which a
-// search comes to a stand: above a touch by a reserve, below what tips the robot.
-constexpr double kReleaseShare = 0.4, kStandstillShare = 2;
+// Share of touch_load at which a search comes to a stand: above a touch by a reserve, below what
+// tips the robot.
+constexpr double kStandstillShare = 2;
 
 }  // namespace
 
@@ -174,7 +174,7 @@ balance::ConvexPolygon StanceSole(const robot::FootModel& foot) {
 LandingSpec MakeLandingSpec(const ContactConfirmation& config) {
   LandingSpec spec;
   spec.touch_load = config.touch_load();
-  spec.release_load = kReleaseShare * config.touch_load();
+  spec.release_load = ReleaseLoad(config);
   spec.press_load = kStandstillShare * config.touch_load();
   spec.search_depth = config.search_depth();
   return spec;

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "components/messages/conversions.h"
+#include "components/messages/touch_load.h"
 #include "fmt/format.h"
 #include "logging/metrics/contact_history.h"
 #include "logging/metrics/metric_groups.h"
@@ -11,10 +12,10 @@ namespace {
 
 // Share of the weight from which on a foot has a centre of pressure worth comparing.
 constexpr double kCopShare = 0.25;
-// A touch-down by the true load: as ContactConfirmation's defaults have it.
-constexpr double kTrueTouchLoad = 10, kTrueTouchTime = 0.02;  // N, s
-// N: below it, as long, nothing was touched (LoadLevels' release).
-constexpr double kNoLoad = 4;
+// N of the true load: a touch-down, and below which, as long, nothing was touched. Whatever the run
+// asks for, it is what the planner asks for by default.
+double TrueTouchLoad() { return ContactConfirmation().touch_load(); }
+double NoLoad() { return ReleaseLoad(ContactConfirmation()); }
 constexpr double kWrenchNeesBound = 21.026;  // chi-squared, 12 degrees of freedom, 5 %
 
 using Wrench = Eigen::Matrix<double, 6, 1>;
@@ -80,13 +81,13 @@ Answer ObserverNees(const RunRecord& run, int64_t tick) {
   return error.dot(factors.solve(error));
 }
 
-/// The tick at which the foot's true load, that of `tick`, has been above kTrueTouchLoad for
-/// kTrueTouchTime; empty where it is not above it at `tick`.
+/// The tick at which the foot's true load, that of `tick`, has been above TrueTouchLoad for
+/// kTouchTime; empty where it is not above it at `tick`.
 std::optional<int64_t> TrueTouch(const RunRecord& run, size_t foot, int64_t tick) {
-  const auto lasts = static_cast<int64_t>(std::lround(kTrueTouchTime / run.spec.tick_period()));
-  const auto loaded = [&](int64_t t) {
+  const auto lasts = static_cast<int64_t>(std::lround(kTouchTime / run.spec.tick_period()));
+  const auto loaded = [&, least = TrueTouchLoad()](int64_t t) {
     const ground_truth_t* truth = run.truth.at(t);
-    return truth != nullptr && -truth->foot_wrench[foot].force[2] > kTrueTouchLoad;
+    return truth != nullptr && -truth->foot_wrench[foot].force[2] > least;
   };
   if (!loaded(tick)) return {};
   int64_t begin = tick;
@@ -94,12 +95,12 @@ std::optional<int64_t> TrueTouch(const RunRecord& run, size_t foot, int64_t tick
   return begin + lasts;
 }
 
-/// Whether the foot's true load was nowhere above kNoLoad in the kTrueTouchTime before `tick`.
+/// Whether the foot's true load was nowhere above NoLoad in the kTouchTime before `tick`.
 bool TouchedNothing(const RunRecord& run, size_t foot, int64_t tick) {
-  const auto lasts = static_cast<int64_t>(std::lround(kTrueTouchTime / run.spec.tick_period()));
+  const auto lasts = static_cast<int64_t>(std::lround(kTouchTime / run.spec.tick_period()));
   for (int64_t t = std::max<int64_t>(tick - lasts, 0); t <= tick; ++t) {
     const ground_truth_t* truth = run.truth.at(t);
-    if (truth == nullptr || -truth->foot_wrench[foot].force[2] > kNoLoad) return false;
+    if (truth == nullptr || -truth->foot_wrench[foot].force[2] > NoLoad()) return false;
   }
   return true;
 }
@@ -207,8 +208,9 @@ void AddObserver(MetricList* list) {
                      return Scaled(inside, 1.0 / static_cast<double>(count));
                    }});
   list->push_back({"touch_down_delay_max", "ms",
-                   "touch-downs as planned for, later than when the true load had been above 10 N "
-                   "for 20 ms, largest; 0 of those that came before",
+                   fmt::format("touch-downs as planned for, later than when the true load had been "
+                               "above {} N for {} ms, largest; 0 of those that came before",
+                               TrueTouchLoad(), kMilli * kTouchTime),
                    [](const RunRecord& run) -> Answer {
                      Answer worst;
                      for (const TouchDown& touch : TouchDowns(run)) {
@@ -220,8 +222,9 @@ void AddObserver(MetricList* list) {
                      return worst;
                    }});
   list->push_back({"false_touch_downs", "",
-                   "touch-downs as planned for, of feet whose true load had not been above 4 N in "
-                   "the 20 ms before",
+                   fmt::format("touch-downs as planned for, of feet whose true load had not been "
+                               "above {} N in the {} ms before",
+                               NoLoad(), kMilli * kTouchTime),
                    [](const RunRecord& run) -> Answer {
                      if (run.planner.empty() || run.truth.empty()) return {};
                      int found = 0;

@@ -8,6 +8,7 @@
 #include "components/framework/tick_time.h"
 #include "components/messages/motion.h"
 #include "components/messages/quintic_move.h"
+#include "components/messages/touch_load.h"
 
 namespace poise {
 
@@ -17,8 +18,7 @@ struct LandingSpec {
   double release_load = 0;   ///< N below which it is lost again
   double press_load = 0;     ///< N at which the search comes to a stand, and of a press
   double observed_load = 0;  ///< N that an observed load must be above at least to be contact
-  /// s that a load must last, or its loss: ten periods of 500 Hz, longer than the sensor's noise.
-  double touch_duration = 0.02;
+  double touch_duration = kTouchTime;  ///< s that a load must last, or its loss
   /// s from the touch until the foot counts as a contact. The default is three times relax_time's:
   /// what the lowering presses with is given back first, so that the model's change makes no step
   /// of the torque.
