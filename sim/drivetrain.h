@@ -4,6 +4,7 @@
 
 #include "components/robot/robot_model.h"
 #include "sim/drive_impedance.h"
+#include "sim/sim.pb.h"
 #include "sim/world.h"
 
 namespace poise {
@@ -33,10 +34,10 @@ class Drivetrain {
   struct Options {
     bool inertia = true;
     bool friction = true;
-    double friction_stiffness = 1e4;  ///< sigma, N·m/rad
-    double backlash = 0;              ///< rad, from flank to flank
-    double gear_stiffness = 0;        ///< k, N·m/rad; 0: rigid
-    double gear_damping = 0;          ///< d, N·m·s/rad
+    double friction_stiffness = SimConfig().friction_stiffness();  ///< sigma, N·m/rad
+    double backlash = 0;                                           ///< rad, from flank to flank
+    double gear_stiffness = 0;                                     ///< k, N·m/rad; 0: rigid
+    double gear_damping = 0;                                       ///< d, N·m·s/rad
     /// Whether the rotor moves apart from the link; its inertia must then be greater than 0.
     bool elastic() const { return backlash > 0 || gear_stiffness > 0; }
   };

@@ -4,6 +4,7 @@
 
 #include "components/balance/minimum_jerk.h"
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_rules.h"
 #include "sim/push.h"
 
 namespace poise {
@@ -26,11 +27,7 @@ HandSpring::HandSpring(const Hand& config, const robot::RobotModel& model, doubl
       max_force_(config.max_force()),
       offset_(config.x(), config.y(), config.z()),
       point_(config.point().x(), config.point().y(), config.point().z()) {
-  if (!config.has_start()) throw ConfigError(field + ".start", "missing; give it in s");
-  if (!config.has_move_duration()) {
-    throw ConfigError(field + ".move_duration", "missing; give it in s");
-  }
-  if (!config.has_release()) throw ConfigError(field + ".release", "missing; give it in s");
+  RequireFields(config, {"start", "move_duration", "release"}, field + ".");
   if (release_ < start_ + move_duration_ - kEarly) {
     throw ConfigError(field + ".release", fmt::format("{} s is before the move ends at {} s",
                                                       release_, start_ + move_duration_));

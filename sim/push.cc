@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_rules.h"
 #include "components/robot/dynamics.h"
 
 namespace poise {
@@ -39,8 +40,7 @@ PushProfile::PushProfile(const Push& config, const robot::RobotModel& model, dou
       profile_(config.profile()),
       direction_(config.direction_x(), config.direction_y(), config.direction_z()),
       point_(config.point().x(), config.point().y(), config.point().z()) {
-  if (!config.has_start()) throw ConfigError(field + ".start", "missing; give it in s");
-  if (!config.has_duration()) throw ConfigError(field + ".duration", "missing; give it in s");
+  RequireFields(config, {"start", "duration"}, field + ".");
   if (config.has_peak() == config.has_scaled_impulse()) {
     throw ConfigError(field + ".peak", config.has_peak()
                                            ? "and scaled_impulse exclude each other; remove one"

@@ -7,25 +7,17 @@
 #include <string>
 
 #include "components/balance/minimum_jerk.h"
-#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/config_error.h"
+#include "components/framework/configuration/field_rules.h"
 #include "components/framework/tick_time.h"
 
 namespace poise {
-namespace {
-
-void CheckGiven(bool given, const std::string& field, const char* give) {
-  if (!given) throw ConfigError(field, fmt::format("is missing; give {}", give));
-}
-
-}  // namespace
 
 RatioMoves::RatioMoves(const RedistributorConfig& config) {
   for (int i = 0; i < config.ratio_move_size(); ++i) {
     const RatioMove& move = config.ratio_move(i);
     const std::string field = fmt::format("ratio_move[{}]", i);
-    CheckGiven(move.has_start(), field + ".start", "a time in s");
-    CheckGiven(move.has_duration(), field + ".duration", "a time in s");
-    CheckGiven(move.has_position(), field + ".position", "0 (lower end) to 1 (upper end)");
+    RequireFields(move, {"start", "duration", "position"}, field + ".");
     const double free_from = moves_.empty() ? 0 : moves_.back().start + moves_.back().duration;
     if (move.start() < free_from - kTimeTolerance) {
       throw ConfigError(field + ".start",

@@ -40,13 +40,13 @@ std::optional<Foot> Stance(const FootstepInput& input, const stepping::Recovery*
   return right ? Foot::kRight : Foot::kLeft;
 }
 
-void Put(int i, const stepping::Footstep& step, double ground, double left, Report* out) {
+void Put(int i, const stepping::Footstep& step, double ground, double time_left, Report* out) {
   out->foot[i] = static_cast<int8_t>(step.foot);
   out->x[i] = step.at.position.x();
   out->y[i] = step.at.position.y();
   out->z[i] = ground;
   out->yaw[i] = step.at.yaw;
-  out->touch_down[i] = std::max(0.0, left);
+  out->touch_down[i] = std::max(0.0, time_left);
 }
 
 void ReportPlanned(const FootstepInput& input, const stepping::Recovery* recovery,
@@ -98,11 +98,11 @@ void FootstepReport::Update(const FootstepInput& input, const stepping::Recovery
   if (out->planned > 0) {
     seen.under_way = true;
     seen.foothold = {out->x[0], out->y[0]};
-    seen.left = out->touch_down[0];
+    seen.time_left = out->touch_down[0];
     // A walk is counted on where it is planned.
     if (!walks && recovery->stage() == Stage::kSwinging) {
       const double metre = stepping::LeastSwingTime(1, recovery->choice().limits().acceleration);
-      seen.movable = seen.left * seen.left / (metre * metre);
+      seen.movable = seen.time_left * seen.time_left / (metre * metre);
     }
   }
   const stepping::CaptureRegions regions = (walks ? walk_regions_ : recovery_regions_).About(seen);

@@ -69,7 +69,7 @@ class Participant::Domain {
     if (entity_ < 0) {
       throw UnitreeError(fmt::format(
           "DDS domain {} on interface {} cannot be entered ({}); does `ip link` list it, "
-          "and is it up? Domains are 0 to 232",
+          "and is it up?",
           link.domain(), link.interface(), dds_strretcode(entity_)));
     }
   }

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_rules.h"
 #include "fmt/format.h"
 #include "tools/cli/cli_checks.h"
 #include "tools/cli/command_line.h"
@@ -23,11 +24,10 @@ namespace {
 constexpr std::chrono::milliseconds kRos2Pause{4};
 constexpr std::chrono::milliseconds kRos2Silence{500};  // then it is asked whether the run goes on
 constexpr std::chrono::milliseconds kRos2Patience{60'000};  // until the run has begun
-constexpr int kMostDomain = 232;                            // of DDS
 
 struct Ros2Options {
   std::string run;
-  int domain = 0;
+  uint32_t domain = 0;
   std::string interface = "lo";
   double rate = 100;  // Hz
 };
@@ -45,11 +45,12 @@ void PublishEvents(RunStatus* status, size_t* told, Ros2Publisher* publisher) {
 int Ros2(const Ros2Options& options) {
   CatchStopSignals();
   StandBack();
+  unitree::DdsLink link;
+  link.set_domain(options.domain);
+  link.set_interface(options.interface);
+  CheckFields(link, "--");
   LiveRun live(options.run, "poise log export --mcap", "poise ros2");
   const logging::RunRecord record = ReadStart(live, kRos2Patience);
-  unitree::DdsLink link;
-  link.set_domain(static_cast<uint32_t>(options.domain));
-  link.set_interface(options.interface);
   Ros2Publisher publisher(link, record, options.rate);
   RunStatus status((live.dir() / "run.lcm").string(), ReadScenario(live, record));
   fmt::print("{}: DDS domain {} on {}, topics rt/joint_states, rt/odom, rt/tf, ...\n",
@@ -89,7 +90,6 @@ void AddRos2Command(CLI::App* app, Command* command) {
                    "folder or name of the run; default: the only one that goes on");
   ros2->add_option("--domain", options->domain, "DDS domain")
       ->envname("ROS_DOMAIN_ID")
-      ->check(CLI::Range(0, kMostDomain))
       ->capture_default_str();
   ros2->add_option("--interface", options->interface,
                    "network interface, e.g. eth0; lo: this machine alone")

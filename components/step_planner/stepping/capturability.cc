@@ -63,7 +63,7 @@ CaptureRegions RegionFinder::About(const RegionInput& input) const {
   balance::ConvexPolygon around = footholds_[Other(own)];  // and where the step under way goes
   if (input.under_way) {
     around = HullOf(around, balance::ConvexHull({&planned, 1}));
-    result.first = result.longest = input.left;
+    result.first = result.longest = input.time_left;
   }
   std::array<Points, kMostRegionSteps + 1> corner;
   for (size_t k = 0; k < kRegionDirections; ++k) {
@@ -94,7 +94,7 @@ CaptureRegions RegionFinder::About(const RegionInput& input) const {
       if (input.under_way) {
         const Vector2d foothold =
             balance::NearestPoint(around, planned + input.movable * direction);
-        const double left = std::exp(-input.frequency * input.left);
+        const double left = std::exp(-input.frequency * input.time_left);
         region = farther((1 - left) * edge[own] + left * (foothold + before[Other(own)]), region);
       } else {
         region = now[own];

@@ -23,7 +23,7 @@ struct RegionInput {
   /// that place can still be moved.
   bool under_way = false;
   Eigen::Vector2d foothold = Eigen::Vector2d::Zero();
-  double left = 0, movable = 0;
+  double time_left = 0, movable = 0;
 };
 
 struct CaptureRegions {

@@ -34,8 +34,8 @@ class SocketLink : public Link {
 class UdpLink final : public SocketLink {
  public:
   struct Endpoint {
-    std::string address = "127.0.0.1";  ///< numeric IPv4
-    uint16_t port = kUdpPort;
+    std::string address;  ///< numeric IPv4
+    uint16_t port = 0;
   };
   /// Master's side: sends to `peer`, takes frames from it alone. Throws EthercatError.
   static std::unique_ptr<UdpLink> Connect(const Endpoint& peer);

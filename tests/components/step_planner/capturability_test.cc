@@ -110,25 +110,25 @@ TEST(CaptureRegions, TheirCornersAreJustCaught) {
 // new sole or beyond it, and of one step on the same sole's.
 TEST(CaptureRegions, OfAStepUnderWayAreAboutItsFoothold) {
   const StepChoice choice = Choice();
-  const double frequency = 3.4, left = 0.2, yaw = -0.3;
+  const double frequency = 3.4, time_left = 0.2, yaw = -0.3;
   const Vector2d sole(1, 2), foothold = sole + Eigen::Rotation2Dd(yaw) * Vector2d(0.15, 0.25);
   RegionInput input{Foot::kRight, sole, yaw, frequency, 0.5};
   input.under_way = true;
   input.foothold = foothold;
-  input.left = left;
+  input.time_left = time_left;
   const CaptureRegions regions = RegionFinder(choice).About(input);
-  EXPECT_EQ(regions.first, left);
+  EXPECT_EQ(regions.first, time_left);
   const double half = 0.5 * choice.foot(Foot::kLeft).length - kEdge;
   const Vector2d ahead = Eigen::Rotation2Dd(yaw) * Vector2d(1, 0);
   const double edge = Farthest(regions.region[1], ahead);
   const Vector2d cop = sole + half * ahead;
-  const Vector2d end = CapturePointAfter(edge * ahead, cop, frequency, left);
+  const Vector2d end = CapturePointAfter(edge * ahead, cop, frequency, time_left);
   EXPECT_NEAR((end - foothold).dot(ahead), half, 1e-6);
   // What can be moved in time catches more.
   input.movable = 0.1;
   const double more = Farthest(RegionFinder(choice).About(input).region[1], ahead);
   EXPECT_GT(more, edge + 1e-3);
-  EXPECT_LE(more, edge + 0.1 * std::exp(-frequency * left) + 1e-9);
+  EXPECT_LE(more, edge + 0.1 * std::exp(-frequency * time_left) + 1e-9);
 }
 
 TEST(CaptureRegions, GrowWithTheStepsAndStepsTakeWhatTheSwingTakes) {
