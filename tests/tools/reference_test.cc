@@ -157,13 +157,14 @@ void ExpectDefaultsKeepTheirRules(const google::protobuf::Descriptor& type) {
   for (int i = 0; i < type.field_count(); ++i) {
     const FieldDescriptor* field = type.field(i);
     if (field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) {
-      if (field->message_type()->file()->package() != "poise") continue;
       ExpectDefaultsKeepTheirRules(*field->message_type());
     } else if (field->has_default_value() && !field->is_repeated()) {
       if (field->cpp_type() == FieldDescriptor::CPPTYPE_DOUBLE) {
         reflection->SetDouble(message.get(), field, field->default_value_double());
       } else if (field->cpp_type() == FieldDescriptor::CPPTYPE_INT32) {
         reflection->SetInt32(message.get(), field, field->default_value_int32());
+      } else if (field->cpp_type() == FieldDescriptor::CPPTYPE_UINT32) {
+        reflection->SetUInt32(message.get(), field, field->default_value_uint32());
       }
     }
   }
@@ -171,13 +172,10 @@ void ExpectDefaultsKeepTheirRules(const google::protobuf::Descriptor& type) {
 }
 
 TEST(FieldRules, EveryDefaultKeepsThem) {
-  ExpectDefaultsKeepTheirRules(*StepPlannerConfig::descriptor());
-  ExpectDefaultsKeepTheirRules(*SimConfig::descriptor());
-  ExpectDefaultsKeepTheirRules(*StateEstimatorConfig::descriptor());
-  ExpectDefaultsKeepTheirRules(*TaskControllerConfig::descriptor());
-  ExpectDefaultsKeepTheirRules(*ContactWrenchMonitorConfig::descriptor());
-  ExpectDefaultsKeepTheirRules(*RedistributorConfig::descriptor());
-  ExpectDefaultsKeepTheirRules(*HwBridgeConfig::descriptor());
+  ExpectDefaultsKeepTheirRules(*Scenario::descriptor());  // all components' are in it
+  ExpectDefaultsKeepTheirRules(*Robot::descriptor());
+  ExpectDefaultsKeepTheirRules(*Sweep::descriptor());
+  ExpectDefaultsKeepTheirRules(*RunSpec::descriptor());
 }
 
 TEST(FieldRules, AnErrorNamesPathValueAndRange) {
@@ -204,6 +202,26 @@ TEST(FieldRules, AnErrorNamesPathValueAndRange) {
             "hw_bridge.enable_cycles: is 0; must be 1 or more");
   EXPECT_EQ(problem_of("step_planner.walk.clearance", "-1"),
             "step_planner.walk.clearance: is -1; must be greater than 0");
+  EXPECT_EQ(problem_of("hw_bridge.ethercat.link.udp.port", "70000"),
+            "hw_bridge.ethercat.link.udp.port: is 70000; must be 1 to 65535");
+  EXPECT_EQ(problem_of("sim.crane.height", "inf"),
+            "sim.crane.height: is inf; must be finite and 0 or more");
+}
+
+TEST(FieldRules, AFieldThatIsNotThereIsNamedWithItsRange) {
+  Push push;
+  push.set_duration(0.1);
+  EXPECT_NO_THROW(RequireFields(push, {"duration"}));
+  const auto problem_of = [&](const char* field) -> std::string {
+    try {
+      RequireFields(push, {"duration", field}, "push[2].");
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_EQ(problem_of("start"), "push[2].start: is missing; must be 0 or more");
+  EXPECT_EQ(problem_of("peak"), "push[2].peak: is missing; must be a finite number");
 }
 
 TEST(FieldRules, TheReferenceTellsThem) {
@@ -273,9 +291,8 @@ TEST(FieldReference, TheUnitIsWhatACommentBeginsWith) {
 TEST(FieldReference, TheSentenceOfACommentStaysWhole) {
   const std::string text =
       FieldsAsText(SelectFields(FieldReference(Schema::kScenario), "lead"), 1000);
-  EXPECT_THAT(
-      text,
-      HasSubstr("lead: number, default 0\n    s that the run begins before the scenario's time 0"))
+  EXPECT_THAT(text, HasSubstr("lead: number, 0 to 60, default 0\n    s that the run begins before "
+                              "the scenario's time 0"))
       << text;
 }
 
