@@ -10,7 +10,6 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
-#include "tools/cli/cli_checks.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
 #include "tools/report/wrench_difference.h"
@@ -333,9 +332,7 @@ void AddWorldsCommand(CLI::App* app, Command* command) {
       ->type_name("FIELD=VALUE")
       ->allow_extra_args(false)
       ->take_all();
-  worlds->add_option("--duration", options->changes.duration, "simulated time, s")
-      ->check(Within("a number of seconds in (0, 36000]",
-                     [](double s) { return s > 0 && s <= 36000; }));
+  worlds->add_option("--duration", options->changes.duration, "simulated time, s");
   worlds->add_option("--out", arguments->out,
                      "folder for a run's folder each and worlds.csv; default: a dated one under "
                      "runs/");
