@@ -36,7 +36,7 @@ foreach(folder lcmtypes components sim sim_ode sim_mujoco hw_bridge logging)
   endif()
 endforeach()
 install(DIRECTORY ${PROJECT_BINARY_DIR}/poise ${PROJECT_BINARY_DIR}/operate ${PROJECT_BINARY_DIR}/steps
-        DESTINATION ${_headers} COMPONENT dev
+        ${PROJECT_BINARY_DIR}/derived DESTINATION ${_headers} COMPONENT dev
         FILES_MATCHING PATTERN "*.hpp")
 install(FILES ${PROJECT_BINARY_DIR}/poise_commit.h DESTINATION ${_headers} COMPONENT dev)
 

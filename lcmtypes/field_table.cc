@@ -8,6 +8,7 @@ namespace poise {
 MessageSet poise_messages();    // generated
 MessageSet operate_messages();  // generated
 MessageSet steps_messages();    // generated
+MessageSet derived_messages();  // generated
 
 namespace {
 
@@ -17,6 +18,7 @@ struct Known {
     Add(poise_messages());
     Add(operate_messages());
     Add(steps_messages());
+    Add(derived_messages());
   }
 
   void Add(const MessageSet& set) {

@@ -212,7 +212,8 @@ void WriteTraits(const Message& message, const std::map<std::string, LcmStruct>&
 
 /// The unit that a comment begins with; empty when it begins with none.
 std::string UnitOf(const std::string& comment) {
-  for (const std::string unit : {"m/s^2", "rad/s", "m/s", "N·m", "rad", "us", "m", "N", "A", "s"}) {
+  for (const std::string unit :
+       {"m/s^2", "rad/s", "m/s", "N·m", "rad", "us", "m", "N", "A", "s", "%"}) {
     if (!comment.starts_with(unit)) continue;
     if (comment.size() == unit.size() ||
         std::string(",;:( ").find(comment[unit.size()]) != std::string::npos) {
@@ -279,7 +280,7 @@ void WriteTable(const std::string& set, const std::vector<Message>& messages,
   }
   out << "  };\n  return {types, kStructs, kDefinitions};\n}\n\n";
   // Linked in as an object, it makes its messages known by itself; Poise's own are in one library.
-  if (set != "poise" && set != "operate" && set != "steps") {
+  if (set != "poise" && set != "operate" && set != "steps" && set != "derived") {
     out << "namespace {\n[[maybe_unused]] const bool known = AddMessages(" << set
         << "_messages());\n}  // namespace\n\n";
   }

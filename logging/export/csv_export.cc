@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <map>
@@ -9,9 +10,11 @@
 
 #include "components/framework/bus/packet_filter.h"
 #include "components/framework/run.h"
+#include "derived/message_traits.hpp"
 #include "fmt/format.h"
 #include "lcmtypes/field_table.h"
 #include "lcmtypes/message_scalars.h"
+#include "logging/derived/derived_reader.h"
 #include "logging/export/log_export.h"
 #include "logging/log_messages.h"
 #include "logging/paged_file.h"
@@ -49,7 +52,7 @@ class Row final : public ScalarVisitor {
     if (Begin()) fmt::format_to(std::back_inserter(*to_), "{}", value);
   }
   void Real(std::string_view, double value) override {
-    if (Begin()) fmt::format_to(std::back_inserter(*to_), "{}", value);
+    if (Begin() && !std::isnan(value)) fmt::format_to(std::back_inserter(*to_), "{}", value);
   }
   void Text(std::string_view, std::string_view value) override {
     if (Begin()) AppendText(value, to_);
@@ -217,9 +220,10 @@ std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string
   Json units = Json::object();
   CheckedFile units_file((fs::path(folder) / kUnitsFile).string());
   Results results;
+  DerivedReader events(&messages.reader(), messages);
   LogEvent event;
   std::string row;
-  while (messages.reader().Next(&event)) {
+  while (events.Next(&event)) {
     if (event.channel == kRunInfoChannel) continue;
     ExportedChannel& result = results.of(event.channel);
     const MessageType* const type = messages.TypeOf(event);
@@ -286,9 +290,12 @@ std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::
   for (const Channel& channel : messages.spec().graph().channel()) {
     if (!channel.external()) add(channel.name(), channel.type());
   }
+  DerivedReader events(&messages.reader(), messages);
+  if (events.any()) add(kDerivedChannel, MessageTraits<derived::signals_t>::kName);
+  const std::unique_ptr<PagedFile> derived = PagedFile::Scratch();  // their messages
   TickPlaces places(messages.run_known() ? std::max<size_t>(columns.size(), 1) : kMostChannels);
   LogEvent event;
-  while (messages.reader().Next(&event)) {
+  while (events.Next(&event)) {
     const MessageType* const type = messages.TypeOf(event);
     auto found = index.find(event.channel);
     if (found == index.end()) {
@@ -314,11 +321,11 @@ std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::
     const uint64_t row = places.RowOf(LogMessages::Tick(*type, event));
     const bool first = places.Get(row, found->second).offset == 0;
     ++(first ? result.messages : result.refused);
-    if (first) {
-      places.Set(row, found->second,
-                 {static_cast<uint64_t>(event.data.data() - messages.reader().bytes()) + 1,
-                  event.data.size()});
-    }
+    if (!first) continue;
+    const uint64_t at = events.IsDerived(event.channel)
+                            ? derived->Append(event.data)
+                            : static_cast<uint64_t>(event.data.data() - messages.reader().bytes());
+    places.Set(row, found->second, {at + 1, event.data.size()});
   }
   const int64_t lead = LeadTime(messages);
   CheckedFile out(file);
@@ -335,7 +342,8 @@ std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::
         cells.append(columns[i].width, ',');
         continue;
       }
-      const uint8_t* const begin = bytes.At(place.offset - 1);
+      PagedFile& from = events.IsDerived(results[i].channel) ? *derived : bytes;
+      const uint8_t* const begin = from.At(place.offset - 1);
       const MessageType& type = *columns[i].shape->type;
       if (row.empty()) row = TimeAndTick(ReadInt64(begin + type.run_id_offset + 16) - lead, tick);
       AppendValues(type, {begin, place.size}, &cells);

@@ -3,6 +3,7 @@
 #include "components/framework/build_info.h"
 #include "fmt/format.h"
 #include "lcmtypes/field_table.h"
+#include "logging/derived/derived_reader.h"
 #include "logging/export/log_export.h"
 #include "logging/export/mcap_writer.h"
 #include "logging/export/protobuf_messages.h"
@@ -60,8 +61,9 @@ std::vector<ExportedChannel> ExportMcap(const std::string& log, const std::strin
   std::map<std::string, Topic, std::less<>> topics;
   std::vector<ExportedChannel> results;
   LogReader all(log);  // with RUN_INFO
+  DerivedReader events(&all, messages);
   LogEvent event;
-  while (all.Next(&event)) {
+  while (events.Next(&event)) {
     const MessageType* const type = messages.TypeOf(event);
     auto topic = topics.find(event.channel);
     if (topic == topics.end()) {

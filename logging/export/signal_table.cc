@@ -9,7 +9,9 @@
 #include "components/framework/bus/packet_filter.h"
 #include "components/framework/operator_acts.h"
 #include "components/framework/run.h"
+#include "derived/message_traits.hpp"
 #include "fmt/format.h"
+#include "logging/derived/derived_reader.h"
 #include "poise/message_traits.hpp"
 
 namespace poise::logging {
@@ -120,7 +122,8 @@ struct ColumnLane {
 /// Goes through a log's messages that columns are made of.
 class ColumnSource {
  public:
-  ColumnSource(const std::string& path, const RunRecord& run) : run_(run), reader_(path) {
+  ColumnSource(const std::string& path, const RunRecord& run)
+      : run_(run), reader_(path), events_(&reader_, run.spec, &run.robot) {
     for (const Channel& channel : run.spec.graph().channel()) {
       const MessageType* type = FindMessageType(channel.type());
       const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
@@ -138,13 +141,15 @@ class ColumnSource {
   bool Next(size_t* index, const MessageType** type, int64_t* tick,
             std::span<const uint8_t>* data) {
     LogEvent event;
-    while (reader_.Next(&event)) {
+    while (events_.Next(&event)) {
       auto found = lanes_.find(event.channel);
       if (found == lanes_.end()) {
-        if (!event.channel.starts_with("HEALTH_")) continue;
+        const bool derived = events_.IsDerived(event.channel);
+        if (!derived && !event.channel.starts_with("HEALTH_")) continue;
+        const char* const type = derived ? MessageTraits<derived::signals_t>::kName : "health_t";
         found = lanes_
                     .try_emplace(std::string(event.channel),
-                                 Lane{order_.size(), FindMessageType("health_t"), {}, false})
+                                 Lane{order_.size(), FindMessageType(type), {}, false})
                     .first;
         order_.emplace_back(event.channel);
       }
@@ -165,11 +170,12 @@ class ColumnSource {
   struct Lane {
     size_t index;
     const MessageType* type;
-    std::optional<PacketFilter> filter;  ///< none: HEALTH_*, checked as it is decoded
+    std::optional<PacketFilter> filter;  ///< none: HEALTH_*, checked as it is decoded, and DERIVED
     bool external;
   };
 
   std::optional<int64_t> TickOf(const Lane& lane, const LogEvent& event) const {
+    if (events_.IsDerived(event.channel)) return LogMessages::Tick(*lane.type, event);
     if (!lane.filter) {
       health_t message;
       if (!DecodeChecked(event.data.data(), static_cast<int64_t>(event.data.size()), &message) ||
@@ -189,6 +195,7 @@ class ColumnSource {
 
   const RunRecord& run_;
   LogReader reader_;
+  DerivedReader events_;
   std::map<std::string, Lane, std::less<>> lanes_;
   std::vector<std::string> order_;
 };
@@ -206,6 +213,15 @@ void Sort(ChannelColumns* channel) {
   };
   apply(&channel->ticks);
   for (SignalColumn& column : channel->columns) apply(&column.values);
+}
+
+/// A derived signal that a run never tells is none.
+template <class Column>
+void LeaveOutEmpty(const MessageType& type, std::vector<Column>* columns) {
+  if (std::string_view(type.name) != MessageTraits<derived::signals_t>::kName) return;
+  std::erase_if(*columns, [](const Column& column) {
+    return std::ranges::all_of(column.values, [](double value) { return std::isnan(value); });
+  });
 }
 
 }  // namespace
@@ -235,6 +251,7 @@ std::vector<ChannelColumns> ReadColumns(const std::string& path, const RunRecord
     if (!lanes[i] || lanes[i]->ticks.empty()) continue;
     channels.push_back({source.names()[i], lanes[i]->type->name, std::move(lanes[i]->ticks),
                         std::move(lanes[i]->appender.columns())});
+    LeaveOutEmpty(*lanes[i]->type, &channels.back().columns);
     Sort(&channels.back());
   }
   return channels;
@@ -262,6 +279,7 @@ std::vector<ChannelRows> ReadRows(const std::string& path, const RunRecord& run,
     if (!lanes[i] || lanes[i]->messages == 0) continue;
     channels.push_back({source.names()[i], lanes[i]->type->name, lanes[i]->messages,
                         std::move(lanes[i]->filler.columns())});
+    LeaveOutEmpty(*lanes[i]->type, &channels.back().columns);
   }
   return channels;
 }

@@ -54,10 +54,11 @@ struct ChannelRows {
 std::vector<ChannelRows> ReadRows(const std::string& path, const RunRecord& run,
                                   const PageRows& rows);
 
-/// Columns of the log's channels, those of the graph first, then HEALTH_*; a channel without
-/// messages is left out. Counts, run_id, tick and texts are no columns. Of two messages of a tick
-/// the first is taken; an external channel's messages stand at the tick in which they were
-/// recorded. `run` is the record of the same log. Throws LogError.
+/// Columns of the log's channels, those of the graph first, then HEALTH_* and DERIVED, with those
+/// of its signals that the run tells; a channel without messages is left out. Counts, run_id, tick
+/// and texts are no columns. Of two messages of a tick the first is taken; an external channel's
+/// messages stand at the tick in which they were recorded. `run` is the record of the same log.
+/// Throws LogError.
 std::vector<ChannelColumns> ReadColumns(const std::string& path, const RunRecord& run);
 
 }  // namespace poise::logging

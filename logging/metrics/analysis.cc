@@ -85,99 +85,42 @@ std::optional<BalancingIntervals> Balancing(const RunRecord& run) {
   return result;
 }
 
-bool TellsFoot(const joint_command_t& command, size_t foot) {
-  if (command.conditions_met[foot] != 0) return true;
-  if (command.in_contact[foot] == 0) return false;
-  const contact_margins_t& m = command.margins[foot];
-  return !GetWrench(command.foot_wrench[foot]).isZero(0) || m.normal != 0 || m.friction != 0 ||
-         m.yaw != 0 || m.roll != 0 || m.pitch != 0;
+TickView ViewOf(const RunRecord& run, int64_t tick) {
+  TickView view;
+  view.sensors = run.sensors.at(tick);
+  view.state = run.state.at(tick);
+  view.estimator = run.estimator.at(tick);
+  view.plan = run.plan.at(tick);
+  view.planner = run.planner.at(tick);
+  view.balance = run.balance.at(tick);
+  view.command = run.command.at(tick);
+  view.bridge = run.bridge.at(tick);
+  view.push = run.push.at(tick);
+  view.truth = run.truth.at(tick);
+  return view;
 }
 
-bool TellsRatio(const joint_command_t& command) {
-  return command.eta_feasible != 0 || command.eta_max != 0;  // 1 where none is feasible
+RunMessages MessagesOf(const RunRecord& run) {
+  return {!run.plan.empty(), !run.planner.empty(), !run.balance.empty(), !run.bridge.empty(),
+          !run.truth.empty()};
 }
 
-std::optional<Eigen::Matrix<double, 6, 1>> KnownWrench(const RunRecord& run, size_t foot,
-                                                       int64_t tick) {
-  const robot_state_t* state = run.state.at(tick);
-  if (state != nullptr && foot < state->foot_wrench_source.size() &&
-      state->foot_wrench_source[foot] == robot_state_t::SOURCE_OBSERVER) {
-    return GetWrench(state->foot_wrench[foot]);
-  }
-  const robot_sensors_t* sensors = run.sensors.at(tick);
-  if (sensors == nullptr || !run.robot.feet()[foot].force_sensor) return {};
-  return GetWrench(sensors->foot_wrench[foot]);
+std::optional<Wrench> KnownWrench(const RunRecord& run, size_t foot, int64_t tick) {
+  return KnownWrench(run.robot, ViewOf(run, tick), foot);
 }
-
-namespace {
-
-/// The soles in the world: as the planner estimates them; without its report the true ones.
-std::optional<std::array<Eigen::Isometry3d, 2>> Soles(const RunRecord& run, int64_t tick) {
-  const auto poses = [](const auto* message) -> std::optional<std::array<Eigen::Isometry3d, 2>> {
-    if (message == nullptr) return {};
-    return std::array{GetPose(message->foot_pose[0]), GetPose(message->foot_pose[1])};
-  };
-  return run.planner.empty() ? poses(run.truth.at(tick)) : poses(run.planner.at(tick));
-}
-
-using FootWrenches = std::array<std::optional<balance::Vector6d>, 2>;  // empty: out of contact
-
-/// Returns the centre of pressure of wrenches on soles that stood so at `tick`; empty in the air.
-std::optional<Eigen::Vector2d> CopOf(const RunRecord& run, int64_t tick,
-                                     const FootWrenches& wrenches) {
-  const auto soles = Soles(run, tick);
-  if (!soles) return {};
-  Eigen::Isometry3d frame;
-  if (!run.balance.empty()) {
-    const balance_torque_t* balance = run.balance.at(tick);
-    if (balance == nullptr) return {};
-    frame = GetPose(balance->frame_o);
-  } else if (!balance::FrameO(*soles, {wrenches[0].has_value(), wrenches[1].has_value()}, &frame)) {
-    return {};
-  }
-  balance::Vector6d resultant = balance::Vector6d::Zero();
-  for (size_t foot = 0; foot < 2; ++foot) {
-    if (!wrenches[foot]) continue;
-    resultant += balance::WrenchTransform(frame, (*soles)[foot]) * *wrenches[foot];
-  }
-  if (!(std::abs(resultant(2)) > 1.0)) return {};  // in the air
-  return balance::CenterOfPressure(resultant);
-}
-
-}  // namespace
 
 std::optional<Eigen::Vector2d> ComputedCop(const RunRecord& run, int64_t tick) {
-  if (!run.balance.empty()) {
-    const balance_torque_t* balance = run.balance.at(tick);
-    if (balance == nullptr) return {};
-    return Eigen::Vector2d(balance->cop[0], balance->cop[1]);
-  }
-  const joint_command_t* command = run.command.at(tick);
-  if (command == nullptr) return {};
-  FootWrenches wrenches;
-  for (size_t foot = 0; foot < 2; ++foot) {
-    if (command->in_contact[foot] == 0 || !TellsFoot(*command, foot)) continue;
-    wrenches[foot] = GetWrench(command->foot_wrench[foot]);
-  }
-  return CopOf(run, tick, wrenches);
+  return ComputedCop(run.robot, MessagesOf(run), ViewOf(run, tick));
 }
 
 std::optional<Eigen::Vector2d> MeasuredCop(const RunRecord& run, int64_t tick) {
-  const support_plan_t* plan = run.plan.at(tick - 1);
-  if (!run.plan.empty() && plan == nullptr) return {};
-  FootWrenches wrenches;
-  for (size_t foot = 0; foot < 2; ++foot) {
-    const auto wrench = KnownWrench(run, foot, tick);
-    if (!wrench) return {};
-    const bool carries = plan != nullptr ? InContact(*plan, static_cast<int>(foot))
-                                         : -(*wrench)[2] > LeastReadLoad(run);
-    if (carries) wrenches[foot] = *wrench;
-  }
-  return CopOf(run, tick - 1, wrenches);
+  const auto placed =
+      MeasuredCop(run.robot, MessagesOf(run), ViewOf(run, tick - 1), ViewOf(run, tick));
+  if (!placed) return {};
+  return placed->cop;
 }
 
-std::optional<Eigen::Matrix<double, 6, 1>> WrenchError(const RunRecord& run, int foot,
-                                                       int64_t tick) {
+std::optional<Wrench> WrenchError(const RunRecord& run, int foot, int64_t tick) {
   const support_plan_t* plan = run.plan.at(tick - 1);
   const joint_command_t* command = run.command.at(tick - 1);
   if (plan == nullptr || command == nullptr) return {};
@@ -233,27 +176,6 @@ std::optional<bool> Violated(const RunRecord& run, int64_t tick) {
     if (!(std::abs(balance->cop[axis]) <= balance->cop_limit[axis] + kCopTolerance)) return true;
   }
   return false;
-}
-
-double JointTorqueLimit(const RunRecord& run, size_t joint) {
-  const robot::MotorModel& motor = run.robot.motors()[joint];
-  return std::min(run.robot.joints()[joint].effort, motor.torque_per_ampere() * motor.peak_current);
-}
-
-EstimatorError BaseError(const robot_state_t& estimate, const ground_truth_t& truth) {
-  EstimatorError error;
-  error.position = (GetVector3(estimate.base_position) - GetVector3(truth.base_position)).norm();
-  error.velocity =
-      (GetVector3(estimate.base_linear_velocity) - GetVector3(truth.base_linear_velocity)).norm();
-  const Eigen::Quaterniond estimated = Rotation(estimate.base_orientation);
-  const Eigen::Quaterniond actual = Rotation(truth.base_orientation);
-  // The world's vertical seen from the base.
-  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
-  const Eigen::Vector3d a = estimated.conjugate() * up;
-  const Eigen::Vector3d b = actual.conjugate() * up;
-  error.tilt = std::atan2(a.cross(b).norm(), a.dot(b));
-  error.rotation = estimated.angularDistance(actual);
-  return error;
 }
 
 Eigen::Matrix<double, 9, 1> BaseErrorVector(const robot_state_t& estimate,

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "components/balance/convex_polygon.h"
+#include "logging/derived/definitions.h"
 #include "logging/run_record.h"
 
 namespace poise::logging {
@@ -34,31 +35,19 @@ struct BalancingIntervals {
 /// Empty without BALANCE_TORQUE messages; activations 0 when it was never on.
 std::optional<BalancingIntervals> Balancing(const RunRecord& run);
 
-/// What a command says of contacts, wrenches, conditions and ratio is for the log alone, and a
-/// controller that computes none of it leaves it zero. True when this one tells of the foot; of the
-/// ratio.
-bool TellsFoot(const joint_command_t& command, size_t foot);
-bool TellsRatio(const joint_command_t& command);
+/// What a run holds of a tick, and of any: for logging/derived/definitions.h.
+TickView ViewOf(const RunRecord& run, int64_t tick);
+RunMessages MessagesOf(const RunRecord& run);
 
-/// m, centre of pressure (r_x, r_y) in frame O, (37), (38), of the computed resultant:
-/// BALANCE_TORQUE's; in a run without any, that of the command's wrenches.
+/// Those of logging/derived/definitions.h at `tick`: m, (r_x, r_y) in frame O, and the foot's
+/// wrench.
 std::optional<Eigen::Vector2d> ComputedCop(const RunRecord& run, int64_t tick);
-
-/// m, the same of what the feet's sensors read at `tick`, of the feet in contact: as planned, in a
-/// run without plan those that read a load. A reading shows the command of the tick before, so
-/// frame O and the soles' poses are those of the tick before: as estimated, in a run without plan
-/// and balancing the true ones.
 std::optional<Eigen::Vector2d> MeasuredCop(const RunRecord& run, int64_t tick);
-
-/// The foot's wrench at `tick` as the controller knows it, robot on environment, sole frame: the
-/// sensor's reading, or the observer's where there is no good sensor. Empty without either.
-std::optional<Eigen::Matrix<double, 6, 1>> KnownWrench(const RunRecord& run, size_t foot,
-                                                       int64_t tick);
+std::optional<Wrench> KnownWrench(const RunRecord& run, size_t foot, int64_t tick);
 
 /// Reading at `tick` less the wrench computed for it (the tick before), robot on environment, sole
 /// frame; empty for a foot out of contact.
-std::optional<Eigen::Matrix<double, 6, 1>> WrenchError(const RunRecord& run, int foot,
-                                                       int64_t tick);
+std::optional<Wrench> WrenchError(const RunRecord& run, int foot, int64_t tick);
 
 /// Margin 0..4 (normal, friction, yaw, roll, pitch) of a foot's computed wrench; empty out of
 /// contact.
@@ -71,18 +60,6 @@ balance::ConvexPolygon AcceptableRegion(const balance_torque_t& balance);
 /// conditions at `tick`: (29)-(33) by more than 1e-6 N or N·m; (37), (38) by more than 1 nm, where
 /// there is BALANCE_TORQUE. Empty where the command tells of no foot.
 std::optional<bool> Violated(const RunRecord& run, int64_t tick);
-
-/// N·m, smaller of the URDF's effort and what the motor gives at peak current.
-double JointTorqueLimit(const RunRecord& run, size_t joint);
-
-/// Estimate less truth of the base.
-struct EstimatorError {
-  double position = 0;  ///< m
-  double velocity = 0;  ///< m/s, linear
-  double tilt = 0;      ///< rad, angle between estimated and true vertical
-  double rotation = 0;  ///< rad, whole rotation, heading included
-};
-EstimatorError BaseError(const robot_state_t& estimate, const ground_truth_t& truth);
 
 /// BaseError as ESTIMATOR_STATUS orders it: orientation (rotation vector of estimate times truth
 /// inverted, rad), linear velocity (m/s), position (m), world axes.

@@ -7,8 +7,6 @@
 namespace poise::logging {
 namespace {
 
-// A reading beyond this many standard deviations of its noise is a load.
-constexpr double kNoiseDeviations = 5;
 // m from its reference's end, beyond which a contact is reported as early or late.
 constexpr double kExpectedWithin = 0.02;
 
@@ -64,8 +62,6 @@ class ReferenceEnds {
 };
 
 }  // namespace
-
-double LeastReadLoad(const RunRecord& run) { return kNoiseDeviations * run.robot.force_noise(); }
 
 std::string FootName(const RunRecord& run, size_t foot) {
   return run.robot.feet()[foot].name + " foot";
@@ -135,7 +131,8 @@ std::optional<bool> ContactLost(const RunRecord& run, size_t foot, int64_t tick)
   const robot_state_t* state = run.state.at(tick);
   const bool observed = state != nullptr && foot < state->foot_wrench_source.size() &&
                         state->foot_wrench_source[foot] == robot_state_t::SOURCE_OBSERVER;
-  const double noise = observed ? state->foot_wrench_deviation[foot].force[2] : LeastReadLoad(run);
+  const double noise =
+      observed ? state->foot_wrench_deviation[foot].force[2] : LeastReadLoad(run.robot);
   const auto wrench = KnownWrench(run, foot, tick);
   if (!wrench) return {};
   return -(*wrench)[2] <= noise;

@@ -11,13 +11,6 @@
 
 namespace poise::logging {
 
-/// A foot in contact that is to carry at least this share of the robot's weight counts as loaded:
-/// below it the sensor's noise and the model's error decide what its wrench looks like.
-inline constexpr double kLoadedShare = 0.05;
-
-/// N, above which a foot's sensor reads a load: five standard deviations of its noise.
-double LeastReadLoad(const RunRecord& run);
-
 /// "left foot", by the robot's name for it.
 std::string FootName(const RunRecord& run, size_t foot);
 

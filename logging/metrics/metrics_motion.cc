@@ -9,9 +9,9 @@
 namespace poise::logging {
 namespace {
 
-/// False while the COM follows a centre of pressure.
-bool HasComReference(const support_plan_t& plan, int axis) {
-  return axis == 2 || plan.com_follows == support_plan_t::FOLLOWS_REFERENCE;
+Answer Absolute(Answer value) {
+  if (value) *value = std::abs(*value);
+  return value;
 }
 
 Answer ComMotion(const RunRecord& run) {
@@ -93,12 +93,8 @@ void AddMotion(MetricList* list) {
                                  [&](int64_t t) -> Answer {
                                    const support_plan_t* plan = run.plan.at(t);
                                    const planner_status_t* planner = run.planner.at(t);
-                                   if (plan == nullptr || planner == nullptr ||
-                                       !HasComReference(*plan, axis)) {
-                                     return {};
-                                   }
-                                   return std::abs(planner->com_position[axis] -
-                                                   plan->com_reference.position[axis]);
+                                   if (plan == nullptr || planner == nullptr) return {};
+                                   return Absolute(ComError(*plan, planner->com_position, axis));
                                  }),
                          kMilli);
          }});
@@ -108,18 +104,14 @@ void AddMotion(MetricList* list) {
         {fmt::format("com_error_true_max_{}", kAxis[axis]), "mm",
          fmt::format("largest distance of the true COM from its reference, {}", kAxis[axis]),
          [axis](const RunRecord& run) {
-           return Scaled(
-               Maximum(run,
-                       [&](int64_t t) -> Answer {
-                         const support_plan_t* plan = run.plan.at(t);
-                         const ground_truth_t* truth = run.truth.at(t);
-                         if (plan == nullptr || truth == nullptr || !HasComReference(*plan, axis)) {
-                           return {};
-                         }
-                         return std::abs(truth->com_position[axis] -
-                                         plan->com_reference.position[axis]);
-                       }),
-               kMilli);
+           return Scaled(Maximum(run,
+                                 [&](int64_t t) -> Answer {
+                                   const support_plan_t* plan = run.plan.at(t);
+                                   const ground_truth_t* truth = run.truth.at(t);
+                                   if (plan == nullptr || truth == nullptr) return {};
+                                   return Absolute(ComError(*plan, truth->com_position, axis));
+                                 }),
+                         kMilli);
          }});
   }
   list->push_back(
@@ -170,19 +162,15 @@ void AddMotion(MetricList* list) {
                        "{}",
                        kFoot[foot], kAxis[axis]),
            [foot, axis](const RunRecord& run) {
-             return Scaled(
-                 Maximum(run,
-                         [&](int64_t t) -> Answer {
-                           const auto f = static_cast<size_t>(foot);
-                           const support_plan_t* plan = run.plan.at(t);
-                           const planner_status_t* planner = run.planner.at(t);
-                           if (plan == nullptr || planner == nullptr || plan->in_contact[f] != 0) {
-                             return {};
-                           }
-                           return std::abs(planner->foot_pose[f].position[axis] -
-                                           plan->foot_reference[f].position[axis]);
-                         }),
-                 kMilli);
+             return Scaled(Maximum(run,
+                                   [&](int64_t t) -> Answer {
+                                     const support_plan_t* plan = run.plan.at(t);
+                                     const planner_status_t* planner = run.planner.at(t);
+                                     if (plan == nullptr || planner == nullptr) return {};
+                                     return Absolute(FootError(*plan, *planner,
+                                                               static_cast<size_t>(foot), axis));
+                                   }),
+                           kMilli);
            }});
     }
   }

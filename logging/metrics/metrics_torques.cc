@@ -49,18 +49,10 @@ bool Stopped(const RunRecord& run, int64_t tick) {
   return bridge != nullptr && bridge->state > bridge_status_t::STATE_RUNNING;
 }
 
-/// N·m that a joint's motor gave: in truth; of a real robot as the bridge ordered it, with what the
-/// drive adds by stiffness and damping; without a bridge as commanded. None while the bridge does
-/// not follow.
+/// N·m that a joint's motor gave. None while the bridge does not follow.
 Answer Torque(const RunRecord& run, int64_t tick, size_t joint) {
   if (Stopped(run, tick)) return {};
-  const auto of = [joint](const auto* message, auto field) -> Answer {
-    if (message == nullptr) return {};
-    return (message->*field)[joint];
-  };
-  if (!run.truth.empty()) return of(run.truth.at(tick), &ground_truth_t::joint_torque);
-  if (!run.bridge.empty()) return of(run.bridge.at(tick), &bridge_status_t::applied_torque);
-  return of(run.command.at(tick), &joint_command_t::torque);
+  return MotorTorque(MessagesOf(run), ViewOf(run, tick), joint);
 }
 
 /// The true positions or velocities, else the estimated ones; none while the bridge does not
@@ -106,7 +98,7 @@ void AddTorques(MetricList* list) {
                       [](const RunRecord& run, int64_t t, size_t joint) -> Answer {
                         const Answer torque = Torque(run, t, joint);
                         if (!torque) return {};
-                        return 100 * std::abs(*torque) / JointTorqueLimit(run, joint);
+                        return 100 * std::abs(*torque) / JointTorqueLimit(run.robot, joint);
                       }));
   list->push_back(LargestOfJoints("joint_position_beyond", "rad",
                                   "largest distance of a joint beyond its limit of position while "

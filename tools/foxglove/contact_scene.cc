@@ -1,5 +1,6 @@
 #include "tools/foxglove/contact_scene.h"
 
+#include <cmath>
 #include <vector>
 
 #include "components/balance/support_polygon.h"
@@ -10,6 +11,7 @@ namespace poise {
 namespace {
 
 using Eigen::Vector3d;
+using logging::TickMessages;
 
 // As on the page of a run (web/src/picture/scene.js).
 constexpr SceneColor kComputed{0.26, 0.50, 0.95}, kMeasured{0.95, 0.95, 0.95};
@@ -17,20 +19,13 @@ constexpr SceneColor kPush{0.95, 0.40, 0.10}, kOutline{0.50, 0.58, 0.70};
 constexpr SceneColor kRegion{0.92, 0.20, 0.20}, kCapture{0.90, 0.78, 0.20};
 constexpr SceneColor kCom{0.15, 0.75, 0.45}, kFoothold{0.90, 0.55, 0.95};
 
-constexpr double kLightShare = 0.01;  // of the weight: a foot that carries less shows no force
-constexpr double kLeastPush = 3;      // N: below it the sensor's noise
-constexpr double kPushScale = 1.5;    // of a push's arrow beside the ground's
+constexpr double kLeastPush = 3;                 // N: below it the sensor's noise
+constexpr double kPushScale = 1.5;               // of a push's arrow beside the ground's
 constexpr double kThick = 0.018, kThin = 0.011;  // m, of arrows
 constexpr double kLine = 0.004;                  // m
 constexpr double kAbove = 1e-3;                  // m that marks lie above what they lie on
 
 constexpr double kComSize = 0.044, kMark = 0.022, kSmallMark = 0.015;  // m
-
-/// Where the wrench acts on the plane of the sole, in the world.
-Vector3d PressurePoint(const Eigen::Isometry3d& sole, const wrench_t& wrench) {
-  const double fz = wrench.force[2];
-  return sole * Vector3d(-wrench.moment[1] / fz, wrench.moment[0] / fz, 0);
-}
 
 std::vector<Vector3d> Placed(const Eigen::Isometry3d& frame,
                              std::span<const Eigen::Vector2d> corners) {
@@ -41,6 +36,24 @@ std::vector<Vector3d> Placed(const Eigen::Isometry3d& frame,
   return points;
 }
 
+/// Adds the forces of the wrenches, none where `cop` is not known.
+void AddFootForces(const TickMessages& tick, const std::vector<wrench_t>& wrenches,
+                   double (derived::foot_t::*cop)[2], const char* id, double diameter,
+                   const SceneColor& color, foxglove::SceneUpdate* scene) {
+  foxglove::SceneEntity* const entity = AddEntity(tick.utime, kWorldFrame, id, scene);
+  if (!tick.derived) return;
+  const std::vector<pose_t> soles = SolePoses(tick);
+  for (size_t f = 0; f < std::min({wrenches.size(), soles.size(), tick.derived->foot.size()});
+       ++f) {
+    const double(&at)[2] = tick.derived->foot[f].*cop;
+    if (!std::isfinite(at[0]) || !std::isfinite(at[1])) continue;
+    const Eigen::Isometry3d sole = GetPose(soles[f]);
+    // What the ground does to the robot.
+    const Vector3d force = -(sole.linear() * GetVector3(wrenches[f].force));
+    AddArrow(sole * Vector3d(at[0], at[1], 0), kMetresPerNewton * force, diameter, color, entity);
+  }
+}
+
 }  // namespace
 
 std::vector<pose_t> SolePoses(const TickMessages& tick) {
@@ -49,35 +62,19 @@ std::vector<pose_t> SolePoses(const TickMessages& tick) {
   return {};
 }
 
-ContactScene::ContactScene(const robot::RobotModel& model)
-    : model_(model), least_load_(kLightShare * model.total_mass() * robot::kGravity) {
+ContactScene::ContactScene(const robot::RobotModel& model) {
   for (const robot::FootModel& foot : model.feet()) {
     soles_.push_back(balance::SolePolygon(foot, 0));
   }
 }
 
-void ContactScene::AddFootForces(const std::vector<wrench_t>& wrenches,
-                                 const std::vector<pose_t>& soles, double diameter, const char* id,
-                                 int64_t utime, foxglove::SceneUpdate* scene) const {
-  foxglove::SceneEntity* const entity = AddEntity(utime, kWorldFrame, id, scene);
-  const SceneColor& color = diameter == kThick ? kComputed : kMeasured;
-  for (size_t f = 0; f < std::min(wrenches.size(), soles.size()); ++f) {
-    if (!(std::abs(wrenches[f].force[2]) > least_load_)) continue;
-    const Eigen::Isometry3d sole = GetPose(soles[f]);
-    // What the ground does to the robot.
-    const Vector3d force = -(sole.linear() * GetVector3(wrenches[f].force));
-    AddArrow(PressurePoint(sole, wrenches[f]), kMetresPerNewton * force, diameter, color, entity);
-  }
-}
-
 foxglove::SceneUpdate ContactScene::Forces(const TickMessages& tick) const {
   foxglove::SceneUpdate scene;
-  const std::vector<pose_t> soles = SolePoses(tick);
   const std::vector<wrench_t> none;
-  AddFootForces(tick.command ? tick.command->foot_wrench : none, soles, kThick, "computed forces",
-                tick.utime, &scene);
-  AddFootForces(tick.sensors ? tick.sensors->foot_wrench : none, soles, kThin, "measured forces",
-                tick.utime, &scene);
+  AddFootForces(tick, tick.command ? tick.command->foot_wrench : none,
+                &derived::foot_t::cop_computed, "computed forces", kThick, kComputed, &scene);
+  AddFootForces(tick, tick.sensors ? tick.sensors->foot_wrench : none,
+                &derived::foot_t::cop_measured, "measured forces", kThin, kMeasured, &scene);
   foxglove::SceneEntity* const push = AddEntity(tick.utime, kWorldFrame, "push", &scene);
   if (tick.push && GetVector3(tick.push->force).norm() > kLeastPush) {
     const Vector3d arrow = kPushScale * kMetresPerNewton * GetVector3(tick.push->force);
@@ -121,16 +118,9 @@ foxglove::SceneUpdate ContactScene::Support(const TickMessages& tick) const {
   }
 
   foxglove::SceneEntity* const measured = entity("measured centre of pressure");
-  if (tick.sensors) {
-    Vector3d sum = Vector3d::Zero();
-    double load = 0;
-    for (size_t f = 0; f < std::min(soles.size(), tick.sensors->foot_wrench.size()); ++f) {
-      const wrench_t& wrench = tick.sensors->foot_wrench[f];
-      if (!(std::abs(wrench.force[2]) > least_load_)) continue;
-      sum += wrench.force[2] * PressurePoint(GetPose(soles[f]), wrench);
-      load += wrench.force[2];
-    }
-    if (load != 0) AddSphere(sum / load, kSmallMark, kMeasured, measured);
+  if (tick.derived) {
+    const Vector3d place = GetVector3(tick.derived->cop_measured_place);
+    if (place.allFinite()) AddSphere(place, kSmallMark, kMeasured, measured);
   }
 
   foxglove::SceneEntity* const capture = entity("capture point");

@@ -3,8 +3,8 @@
 
 #include "components/balance/convex_polygon.h"
 #include "components/robot/robot_model.h"
+#include "logging/derived/tick_messages.h"
 #include "tools/foxglove/foxglove.pb.h"
-#include "tools/foxglove/tick_messages.h"
 
 namespace poise {
 
@@ -16,24 +16,19 @@ class ContactScene {
   /// `model` must outlive it.
   explicit ContactScene(const robot::RobotModel& model);
 
-  /// Each foot's ground force on the robot at its centre of pressure, measured (ROBOT_SENSORS) and
-  /// computed (JOINT_COMMAND), and the push. Entities that the tick does not tell are empty.
-  foxglove::SceneUpdate Forces(const TickMessages& tick) const;
+  /// Each foot's ground force on the robot at its centre of pressure (DERIVED), measured
+  /// (ROBOT_SENSORS) and computed (JOINT_COMMAND), and the push. Entities that the tick does not
+  /// tell are empty.
+  foxglove::SceneUpdate Forces(const logging::TickMessages& tick) const;
   /// Soles, support polygon, the region that the centre of pressure is kept in, centre of pressure
   /// computed and measured, capture point, foothold of a step, COM.
-  foxglove::SceneUpdate Support(const TickMessages& tick) const;
+  foxglove::SceneUpdate Support(const logging::TickMessages& tick) const;
 
  private:
-  void AddFootForces(const std::vector<wrench_t>& wrenches, const std::vector<pose_t>& soles,
-                     double diameter, const char* id, int64_t utime,
-                     foxglove::SceneUpdate* scene) const;
-
-  const robot::RobotModel& model_;
   std::vector<balance::ConvexPolygon> soles_;  // each in its own frame
-  double least_load_;                          // N, of a foot whose force is shown
 };
 
 /// Sole poses: true ones where the tick has them; empty when it has none.
-std::vector<pose_t> SolePoses(const TickMessages& tick);
+std::vector<pose_t> SolePoses(const logging::TickMessages& tick);
 
 }  // namespace poise

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "logging/derived/derived_signals.h"
 #include "logging/export/protobuf_messages.h"
 #include "logging/run_record.h"
 #include "tools/foxglove/foxglove_server.h"
@@ -33,9 +34,15 @@ class LiveFoxglove {
   int64_t dropped() const { return server_->dropped(); }
 
  private:
+  void Send(size_t topic, const MessageType& type, int64_t utime, std::span<const uint8_t> data);
+  /// The derived signals of the ticks that have come; with `end` of all.
+  void AddDerived(bool end);
+
   logging::ProtobufMessages protobuf_;
+  logging::DerivedMessages derived_;
   SceneTopics scene_;
   std::unique_ptr<FoxgloveServer> server_;
+  size_t derived_topic_ = 0;
   size_t num_events_ = 0;  // told
 };
 

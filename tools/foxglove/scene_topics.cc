@@ -17,6 +17,7 @@ namespace poise {
 namespace {
 
 namespace pb = google::protobuf;
+using logging::TickMessages;
 
 constexpr double kPictures = 100;  // Hz: beyond what a screen shows
 constexpr size_t kSceneTriangles = 40'000;

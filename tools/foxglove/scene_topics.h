@@ -9,12 +9,12 @@
 #include <string_view>
 #include <vector>
 
+#include "logging/derived/tick_messages.h"
 #include "logging/events/events.h"
 #include "logging/run_record.h"
 #include "tools/foxglove/contact_scene.h"
 #include "tools/foxglove/ground_scene.h"
 #include "tools/foxglove/robot_frames.h"
-#include "tools/foxglove/tick_messages.h"
 
 namespace poise {
 
@@ -41,7 +41,7 @@ class SceneTopics {
   const std::vector<SceneTopic>& topics() const { return topics_; }
   /// What does not change: frames, robot and description.
   void Begin();
-  /// A message of the run, well formed.
+  /// A message of the run, well formed, and of DERIVED (logging::DerivedMessages).
   void Add(std::string_view channel, const MessageType& type, std::span<const uint8_t> data);
   /// What has happened. `time` in s of the scenario.
   void AddEvent(double time, std::string_view name, std::string_view detail);
@@ -62,8 +62,8 @@ class SceneTopics {
 
   template <class Message>
   void Publish(Topic topic, int64_t utime, const Message& message);
-  void AddTick(const TickMessages& tick);
-  void AddJointStates(const TickMessages& tick);
+  void AddTick(const logging::TickMessages& tick);
+  void AddJointStates(const logging::TickMessages& tick);
   /// us of the run at a time (s) of the scenario.
   int64_t Utime(double time) const;
 
@@ -73,7 +73,7 @@ class SceneTopics {
   RobotFrames frames_;
   ContactScene contacts_;
   GroundScene ground_;
-  TickGatherer gatherer_;
+  logging::TickGatherer gatherer_;
   robot::RobotState state_;
   bool truth_came_ = false;
   std::vector<std::string> joint_names_;

@@ -7,6 +7,8 @@
 #include <cstring>
 
 #include "components/framework/run.h"
+#include "components/robot_files/robot_files.h"
+#include "derived/message_traits.hpp"
 #include "logging/export/signal_table.h"
 #include "tools/live/field_selection.h"
 
@@ -72,29 +74,61 @@ TickRing::TickRing(const RunSpec& spec, int64_t capacity)
     : capacity_(capacity), slots_(capacity + kReceiveWindow), planned_(spec.num_ticks()) {
   for (const Channel& channel : spec.graph().channel()) {
     const MessageType* type = FindMessageType(channel.type());
-    const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
-    Lane lane{channel.name(), type, channel.external(), {}};
-    Place place{{}, integers_, reals_};
-    const auto scalars = ReadScalars(*type, ZeroMessage(*type, counts));
-    for (const Scalar& scalar : scalars.value()) {
-      const bool integer = std::holds_alternative<int64_t>(scalar.value);
-      if (!logging::IsSignal(*type, scalar.path)) {
-        place.kinds.push_back(Kind::kNone);
-        continue;
-      }
-      place.kinds.push_back(integer ? Kind::kInteger : Kind::kReal);
-      ++(integer ? integers_ : reals_);
-      lane.signals.push_back({scalar.path, integer});
-    }
     dense_ += channel.external() ? 0 : 1;
-    lanes_.push_back(std::move(lane));
-    places_.push_back(std::move(place));
+    AddLane({channel.name(), type, channel.external(), {}},
+            {channel.count().begin(), channel.count().end()});
   }
+  AddDerivedLane(spec);
   const auto slots = static_cast<size_t>(slots_);
   integer_values_.resize(slots * integers_);
   real_values_.resize(slots * reals_);
   arrived_.resize(slots);
   last_tick_.assign(lanes_.size(), -1);
+}
+
+void TickRing::AddLane(Lane lane, const std::vector<int32_t>& counts) {
+  Place place{{}, integers_, reals_};
+  const auto scalars = ReadScalars(*lane.type, ZeroMessage(*lane.type, counts));
+  for (const Scalar& scalar : scalars.value()) {
+    const bool integer = std::holds_alternative<int64_t>(scalar.value);
+    const bool told = lane.name != logging::kDerivedChannel || derived_ == nullptr ||
+                      derived_->signals().Tells(scalar.path);
+    if (!told || !logging::IsSignal(*lane.type, scalar.path)) {
+      place.kinds.push_back(Kind::kNone);
+      continue;
+    }
+    place.kinds.push_back(integer ? Kind::kInteger : Kind::kReal);
+    ++(integer ? integers_ : reals_);
+    lane.signals.push_back({scalar.path, integer});
+  }
+  lanes_.push_back(std::move(lane));
+  places_.push_back(std::move(place));
+}
+
+void TickRing::AddDerivedLane(const RunSpec& spec) {
+  std::string robot, urdf;
+  for (const Resource& resource : spec.resource()) {
+    if (resource.name() == "robot") robot = resource.text();
+    if (resource.name() == "urdf") urdf = resource.text();
+  }
+  const bool taken = std::ranges::any_of(
+      lanes_, [](const Lane& lane) { return lane.name == logging::kDerivedChannel; });
+  if (robot.empty() || taken) return;
+  try {
+    robot_ = std::make_shared<const robot::RobotModel>(robot::LoadRobotTexts(robot, urdf));
+  } catch (const robot::RobotError&) {
+    return;
+  }
+  derived_ = std::make_unique<logging::DerivedMessages>(spec, *robot_);
+  if (!derived_->signals().any()) {
+    derived_.reset();
+    return;
+  }
+  AddLane({logging::kDerivedChannel,
+           FindMessageType(MessageTraits<derived::signals_t>::kName),
+           false,
+           {}},
+          derived_->signals().counts());
 }
 
 void TickRing::Clear(int64_t tick) {
@@ -112,6 +146,8 @@ void TickRing::Start(int64_t tick) {
 }
 
 void TickRing::Take() {
+  std::span<const uint8_t> derived;
+  if (derived_ && derived_->TakeTick(end_, &derived)) Fill(lanes_.size() - 1, derived, end_);
   const int missing = dense_ - arrived_[Slot(end_)];
   // Who comes late has missed parts of the first ticks.
   const bool beginning = first_ == end_ && end_ < start_ + kMaxLead;
@@ -137,18 +173,18 @@ void TickRing::TakeComplete() {
   while (end_ <= newest_ && (arrived_[Slot(end_)] == dense_ || newest_ >= end_ + kMaxLead)) Take();
 }
 
-void TickRing::Fill(const LiveMessage& message, int64_t tick) {
+void TickRing::Fill(size_t lane, std::span<const uint8_t> data, int64_t tick) {
   const size_t slot = Slot(tick);
-  Filler filler(places_[static_cast<size_t>(message.index)],
-                integer_values_.data() + slot * integers_, real_values_.data() + slot * reals_);
-  message.type->visit(message.data.data(), static_cast<int64_t>(message.data.size()), &filler);
+  Filler filler(places_[lane], integer_values_.data() + slot * integers_,
+                real_values_.data() + slot * reals_);
+  lanes_[lane].type->visit(data.data(), static_cast<int64_t>(data.size()), &filler);
 }
 
 void TickRing::Add(const LiveMessage& message) {
   if (message.index < 0) return;
   const auto channel = static_cast<size_t>(message.index);
   if (lanes_[channel].external) {
-    if (newest_ >= 0) Fill(message, std::max(newest_, end_));
+    if (newest_ >= 0) Fill(channel, message.data, std::max(newest_, end_));
     return;
   }
   const int64_t tick = message.tick;
@@ -166,7 +202,8 @@ void TickRing::Add(const LiveMessage& message) {
   newest_ = std::max(newest_, tick);
   if (tick < end_ || tick <= last_tick_[channel]) return;
   last_tick_[channel] = tick;
-  Fill(message, tick);
+  Fill(channel, message.data, tick);
+  if (derived_) derived_->Add(message.channel, *message.type, message.data);
   ++arrived_[Slot(tick)];
   TakeComplete();
 }

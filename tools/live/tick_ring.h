@@ -2,18 +2,20 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "logging/derived/derived_signals.h"
 #include "tools/run/live_run.h"
 
 namespace poise {
 
-/// Every scalar of every channel of a run's graph by tick: the signals of
-/// docs/reference/report_format.md. A tick is taken when all channels have it, or when the run is
-/// kMaxLead ticks beyond it and what lacks is lost; its numbers are then NaN. The first one held is
-/// whole. Memory is all taken at the start.
+/// Every scalar of every channel of a run's graph by tick, and what follows from them (DERIVED):
+/// the signals of docs/reference/report_format.md. A tick is taken when all channels have it, or
+/// when the run is kMaxLead ticks beyond it and what lacks is lost; its numbers are then NaN. The
+/// first one held is whole. Memory is all taken at the start.
 class TickRing {
  public:
   struct Signal {
@@ -27,10 +29,11 @@ class TickRing {
     std::vector<Signal> signals;
   };
 
-  /// Keeps `capacity` >= 1 ticks. `spec` as LiveRun has checked it.
+  /// Keeps `capacity` >= 1 ticks. `spec` as LiveRun has checked it; without a robot among its
+  /// resources nothing is derived.
   TickRing(const RunSpec& spec, int64_t capacity);
 
-  /// In the graph's order.
+  /// In the graph's order, then DERIVED.
   const std::vector<Lane>& lanes() const { return lanes_; }
   int64_t capacity() const { return capacity_; }
 
@@ -63,7 +66,9 @@ class TickRing {
   class Filler;
 
   size_t Slot(int64_t tick) const { return static_cast<size_t>(tick % slots_); }
-  void Fill(const LiveMessage& message, int64_t tick);
+  void AddLane(Lane lane, const std::vector<int32_t>& counts);
+  void AddDerivedLane(const RunSpec& spec);
+  void Fill(size_t lane, std::span<const uint8_t> data, int64_t tick);
   void Clear(int64_t tick);
   void Start(int64_t tick);
   void TakeUntil(int64_t tick);
@@ -72,6 +77,8 @@ class TickRing {
 
   std::vector<Lane> lanes_;
   std::vector<Place> places_;
+  std::shared_ptr<const robot::RobotModel> robot_;
+  std::unique_ptr<logging::DerivedMessages> derived_;  // null: none, and no lane
   int64_t capacity_;
   int64_t slots_;
   int64_t planned_;

@@ -11,6 +11,8 @@
 namespace poise {
 namespace {
 
+using logging::TickMessages;
+
 // What stands still, as ROS 2's REP 105 names it for a pose that drifts and never jumps.
 constexpr const char* kOdometryFrame = "odom";
 constexpr const char* kNode = "poise";

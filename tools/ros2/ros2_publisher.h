@@ -8,9 +8,9 @@
 #include <string_view>
 #include <vector>
 
+#include "logging/derived/tick_messages.h"
 #include "logging/run_record.h"
 #include "tools/foxglove/robot_frames.h"
-#include "tools/foxglove/tick_messages.h"
 #include "tools/ros2/ros2_writers.h"
 
 namespace poise {
@@ -34,17 +34,17 @@ class Ros2Publisher {
 
  private:
   void PublishStatic();
-  void Publish(const TickMessages& tick);
-  void PublishJoints(const TickMessages& tick);
+  void Publish(const logging::TickMessages& tick);
+  void PublishJoints(const logging::TickMessages& tick);
   void PublishBase(const robot_state_t& state, const foxglove::FrameTransforms& frames,
                    int64_t utime);
-  void PublishWrenches(const TickMessages& tick);
+  void PublishWrenches(const logging::TickMessages& tick);
   void PublishFrames(const foxglove::FrameTransforms& frames, Ros2Writer* writer);
   void Write(Ros2Writer* writer, const void* message);
 
   const logging::RunRecord& run_;
   RobotFrames frames_;
-  TickGatherer gatherer_;
+  logging::TickGatherer gatherer_;
   robot::RobotState state_;
   std::vector<std::string> joint_names_, sole_frames_;
   unitree::Participant participant_;

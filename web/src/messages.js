@@ -1,7 +1,7 @@
 // Units, texts and names of constants of the messages' fields, read from the comments of the .lcm files: of Poise's own when
 // the page is built, of a module's where it is shown.
 
-const UNITS = ['m/s^2', 'rad/s', 'm/s', 'N·m', 'rad', 'us', 'm', 'N', 'A', 's'];
+const UNITS = ['m/s^2', 'rad/s', 'm/s', 'N·m', 'rad', 'us', 'm', 'N', 'A', 's', '%'];
 
 const SCALARS = new Set(['int8_t', 'byte', 'boolean', 'int16_t', 'int32_t', 'int64_t', 'float', 'double', 'string']);
 

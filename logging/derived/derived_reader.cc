@@ -1,0 +1,67 @@
+#include "logging/derived/derived_reader.h"
+
+#include <vector>
+
+#include "components/robot_files/robot_files.h"
+#include "logging/channel_ticks.h"
+
+namespace poise::logging {
+namespace {
+
+constexpr size_t kMostTicks = 256;  // a log may hold a message that far behind the others
+
+}  // namespace
+
+DerivedReader::DerivedReader(LogReader* reader, const RunSpec& spec, const robot::RobotModel* robot)
+    : reader_(reader) {
+  if (robot != nullptr) Start(spec, *robot);
+}
+
+DerivedReader::DerivedReader(LogReader* reader, const LogMessages& messages) : reader_(reader) {
+  if (!messages.run_known()) return;
+  try {
+    own_robot_ = robot::LoadRobotTexts(messages.info().robot, messages.info().urdf);
+  } catch (const robot::RobotError&) {
+    return;
+  }
+  Start(messages.spec(), *own_robot_);
+}
+
+void DerivedReader::Start(const RunSpec& spec, const robot::RobotModel& robot) {
+  for (const Channel& channel : spec.graph().channel()) {
+    if (channel.name() == kDerivedChannel) return;
+    if (channel.external()) continue;
+    const MessageType& type = ChannelType(channel);
+    const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
+    lanes_.try_emplace(
+        channel.name(),
+        Lane{&type, PacketFilter(type.fingerprint, static_cast<int>(type.encoded_size(counts)),
+                                 counts, spec.run_id())});
+  }
+  derived_.emplace(spec, robot, kMostTicks);
+  if (!derived_->signals().any()) derived_.reset();
+}
+
+bool DerivedReader::Next(LogEvent* event) {
+  LogEvent next;
+  while (!derived_ || !derived_->Take(ended_, &next.utime, &next.data)) {
+    if (ended_) return false;
+    if (!reader_->Next(event)) {
+      ended_ = true;
+      continue;
+    }
+    if (!derived_) return true;
+    if (event->channel == kDerivedChannel) continue;  // damage alone calls one so
+    const auto lane = lanes_.find(event->channel);
+    if (lane != lanes_.end() && lane->second.filter.Check(event->data.data(), event->data.size(), 0,
+                                                          INT64_MAX) == PacketVerdict::kAccepted) {
+      derived_->Add(event->channel, *lane->second.type, event->data);
+    }
+    return true;
+  }
+  next.channel = kDerivedChannel;
+  *event = next;
+  return true;
+}
+
+}  // namespace poise::logging
