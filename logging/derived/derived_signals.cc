@@ -219,8 +219,12 @@ const std::vector<Definition>& Definitions() {
              in, [&](size_t f) { return ComputedWrench(in.now, f); },
              &derived::foot_t::load_computed, &derived::foot_t::cop_computed,
              &derived::foot_t::ratio_computed, LightLoad(in.robot), out);
+         const joint_command_t& command = *in.now.command;
+         const bool tells = TellsFoot(command, 0) || TellsFoot(command, 1);
          for (size_t f = 0; f < out->foot.size(); ++f) {
            Put(ContactLimits(in.robot, in.now, f), &out->foot[f].limit);
+           // A foot in the air bears nothing, which is told as well.
+           if (tells) out->foot[f].load_computed = 0.0 - command.foot_wrench[f].force[2];
          }
        }},
       {{"foot.load_measured", "foot.cop_measured", "foot.ratio_measured"},

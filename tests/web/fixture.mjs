@@ -2,10 +2,10 @@
 import {readFileSync, readdirSync} from 'node:fs';
 import {parseMessage} from '../../web/src/messages.js';
 import {Run} from '../../web/src/data.js';
-import {addDerivedSignals} from '../../web/src/derived.js';
 
 const lcm = new URL('../../lcmtypes/', import.meta.url);
-const files = [...readdirSync(lcm).filter((f) => f.endsWith('.lcm')), 'steps/footsteps_t.lcm'];
+const files = [...readdirSync(lcm).filter((f) => f.endsWith('.lcm')), 'steps/footsteps_t.lcm',
+  ...['ratios_t', 'foot_t', 'signals_t'].map((name) => `derived/${name}.lcm`)];
 const sources = new Map(files.map((f) => readFileSync(new URL(f, lcm), 'utf8')).map((text) => [parseMessage(text).name, text]));
 export const messages = Object.fromEntries([...sources.values()].map(parseMessage).map((m) => [m.name, m]));
 
@@ -17,13 +17,15 @@ function paths(type, source) {
   return [...source.matchAll(/^\s+(\w+)\s+(\w+)(?:\[(\w+)\])?;/gm)].flatMap(([, fieldType, name, size]) => {
     if (name.startsWith('num_') || name === 'run_id' || name === 'tick' || fieldType === 'string') return [];
     const names = size ? Array.from({length: COUNTS[size] ?? Number(size)}, (_, i) => `${name}[${i}]`) : [name];
-    return messages[fieldType] ? names.flatMap((n) => paths(fieldType, sourceOf(fieldType)).map((p) => `${n}.${p}`)) : names;
+    const own = messages[type].fields[name].type;  // in full
+    return messages[own] ? names.flatMap((n) => paths(own, sourceOf(own)).map((p) => `${n}.${p}`)) : names;
   });
 }
 const sourceOf = (type) => sources.get(type);
 
 const TYPES = ['drive_feedback_t', 'robot_sensors_t', 'robot_state_t', 'estimator_status_t', 'support_plan_t', 'planner_status_t', 'task_torque_t',
-  'balance_torque_t', 'joint_command_t', 'bridge_status_t', 'external_push_t', 'ground_truth_t', 'steps.footsteps_t'];
+  'balance_torque_t', 'joint_command_t', 'bridge_status_t', 'external_push_t', 'ground_truth_t', 'steps.footsteps_t',
+  'derived.signals_t'];
 
 /** A robot with a pitch and a roll joint in the right leg, none in the left. */
 export const robot = {
@@ -39,17 +41,13 @@ export const robot = {
 
 /** `constants`: value by "type.field"; all others are 0. `live`: {keep} of a run in progress. `more`: of its scenario. `gone`: types it lacks. */
 export function makeRun(section, constants = {}, ticks = 4, live = undefined, more = {}, gone = []) {
-  const channels = TYPES.filter((type) => !gone.includes(type)).map((type) => ({name: type.replace(/_t$/, '').toUpperCase(), type, count: ticks,
+  const channels = TYPES.filter((type) => !gone.includes(type)).map((type) => ({name: type === 'derived.signals_t' ? 'DERIVED' : type.replace(/_t$/, '').toUpperCase(), type, count: ticks,
     signals: paths(type, sourceOf(type)).map((field) => ({field, integer: false, value: constants[`${type}.${field}`] ?? 0}))}));
-  const limits = {half_length: 0.12, half_width: 0.05, friction: 0.9, yaw_friction: 0.8};
-  const run = new Run({
+  return new Run({
     format: 1, channels, robot, events: [], live,
     run: {tick_period: 0.002, ticks, checks: [], assumptions: [], components: [], channels: []},
-    scenario: {name: 'test', paper_section: section,
-      redistributor: {double_support: limits, single_support: {...limits, half_width: 0.06}}, ...more},
+    scenario: {name: 'test', paper_section: section, ...more},
   }, messages, () => { throw new Error('no packed column here'); });
-  addDerivedSignals(run);
-  return run;
 }
 
 export async function valuesOf(run, name) {

@@ -108,10 +108,10 @@ test('the page shows the run, plays it, and needs no network', async () => {
   // The page's numbers against those that C++ worked out for the table.
   const check = (name) => summary.checks.find((c) => c.name === name).measured;
   const largest = (values) => Math.max(...values.filter((x) => !Number.isNaN(x)).map(Math.abs));
-  near(largest(await signal(page, 'derived.push_magnitude')), check('push_peak'), 1e-3);
-  near(1e3 * largest(await signal(page, 'derived.com_error_y')), check('com_error_max_y'), 1e-3);
-  near(1e3 * largest(await signal(page, 'derived.cop_measured_y')), check('cop_measured_max_y'), 1e-3);
-  near(1e3 * largest(await signal(page, 'derived.cop_measured_x')), check('cop_measured_max_x'), 1e-3);
+  near(largest(await signal(page, 'DERIVED.push_magnitude')), check('push_peak'), 1e-3);
+  near(1e3 * largest(await signal(page, 'DERIVED.com_error[1]')), check('com_error_max_y'), 1e-3);
+  near(1e3 * largest(await signal(page, 'DERIVED.cop_measured[1]')), check('cop_measured_max_y'), 1e-3);
+  near(1e3 * largest(await signal(page, 'DERIVED.cop_measured[0]')), check('cop_measured_max_x'), 1e-3);
   const phases = await page.evaluate(() => window.poise.grid.shared.phases.balancing);
   near(phases[0].from, check('balancing_first'), 1e-9);
   const table = await page.locator('#tables table').first().innerText();
@@ -677,7 +677,7 @@ test('a plot is saved as vectors, which name run, signal and unit, and have the 
   assert.equal(root, 'svg');
   assert.equal(words.find((word) => word.startsWith('push_double_support:')), 'push_double_support: Fig. 9b External push, magnitude (N)');
   assert.ok(words.some((word) => /^push_double_support \(a, \d{4}-/.test(word)) && words.includes('measured'), words.join('; '));
-  const force = await signal(page, 'derived.push_magnitude'), most = Math.max(...force);
+  const force = await signal(page, 'DERIVED.push_magnitude'), most = Math.max(...force);
   assert.equal(curves.length, 1);
   for (const [time, value] of curves[0].points) {
     // Places are rounded to 0.01 units, some 3 µs and 0.01 N; a signal's time is its tick's.

@@ -3,6 +3,7 @@
 #include <google/protobuf/util/json_util.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <functional>
@@ -14,6 +15,7 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/modules.h"
+#include "derived/message_traits.hpp"
 #include "fmt/format.h"
 #include "lcmtypes/field_table.h"
 #include "logging/events/events.h"
@@ -186,7 +188,9 @@ Json RowChannelsJson(const std::vector<logging::ChannelRows>& channels, int64_t 
 logging::PageRows RowsOf(const logging::RunRecord& record,
                          const std::vector<logging::Event>& events, double megabytes) {
   const int64_t first = record.spec.cut().first_tick();
-  double signals = 0;
+  const std::array<int32_t, 2> joints_and_feet{record.robot.num_joints(), 2};
+  double signals =
+      static_cast<double>(MessageTraits<derived::signals_t>::EncodedSize(joints_and_feet)) / 8;
   for (const Channel& channel : record.spec.graph().channel()) {
     const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
     signals += static_cast<double>(FindMessageType(channel.type())->encoded_size(counts)) / 8;

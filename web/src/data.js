@@ -246,21 +246,15 @@ export class Run extends EventTarget {
   appendTicks(count, values) {
     const none = new Float32Array(count).fill(NaN);
     const dropped = Math.max(0, this.numRows + count - this.keep);
-    const derived = [];
-    for (const signal of this.signals.values()) {
-      if (signal.append) signal.append(signal.columnOf(values) ?? none, dropped);
-      else derived.push(signal);
-    }
+    for (const signal of this.signals.values()) signal.append(signal.columnOf(values) ?? none, dropped);
     this.firstTick += dropped;
     this.numRows += count - dropped;
-    for (const signal of derived) signal.grow(dropped);
     this.dispatchEvent(new Event('append'));
   }
 
   /** Ticks that come after later ones: batches {first, count, values}. What finds no room is passed over. Fires 'restart' and 'append'. */
   fillTicks(batches) {
     const least = Math.max(0, this.firstTick + this.numRows - this.keep);
-    const own = [...this.signals.values()].filter((s) => s.append), derived = [...this.signals.values()].filter((s) => !s.append);
     const kept = batches.filter(({first, count}) => count > 0 && first + count > least);
     const added = Math.max(0, ...kept.map(({first}) => this.firstTick - Math.max(first, least)));
     for (const signal of added > 0 ? this.signals.values() : []) signal.prepend(added);
@@ -268,11 +262,10 @@ export class Run extends EventTarget {
     this.numRows += added;
     for (const {first, count, values} of kept) {
       const skipped = Math.max(0, least - first), row = first + skipped - this.firstTick;
-      for (const signal of own) {
+      for (const signal of this.signals.values()) {
         const column = signal.columnOf(values);
         if (column) signal.fill(row, column.subarray(skipped, skipped + Math.max(0, this.numRows - row)));
       }
-      for (const signal of derived) signal.fill(row, count - skipped);
     }
     this.#renumber();
     this.dispatchEvent(new Event('append'));

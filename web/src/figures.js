@@ -1,20 +1,30 @@
 // Which plots a run gets: the paper's figures of its section, then what every run is looked at for.
-import {CONDITIONS, torqueOf} from './derived.js';
 import {LIMITS_SHOWN} from './units.js';
 
 const series = (label, role, type, field) => ({label, role, type, field});
-const derived = (label, role, name) => ({label, role, type: 'derived', field: name});
+/** Of what follows from a run's messages: lcmtypes/derived/. */
+export const DERIVED = 'derived.signals_t';
+const derived = (label, role, field) => series(label, role, DERIVED, field);
+
+/** Ratios of a sole's wrench to |F_z| that (30)-(33) limit. */
+const CONDITIONS = [
+  {key: 'friction', number: '30', unit: '', limit: 'μ_s', text: '|(F_x, F_y)| / |F_z|'},
+  {key: 'yaw', number: '31', unit: 'm', limit: 'μ_z', text: '|M_z| / |F_z|'},
+  {key: 'roll', number: '32', unit: 'm', limit: 'l_y/2', text: '|M_x| / |F_z|'},
+  {key: 'pitch', number: '33', unit: 'm', limit: 'l_x/2', text: '|M_y| / |F_z|'},
+];
 
 const SUPPORT_NOTE = 'The yellow areas show when balancing runs.';
 
 function comMotion(run, figure, title, axes, note = '') {
   // Whoever came late, or has a part of the run, knows no earlier place.
-  const origin = run.firstTick > 0 ? ` Motion from where it was at ${run.start.toFixed(3)} s, the first that this page has.` : '';
+  const origin = run.meta.live ? ' Motion from where it was in the first tick that the viewer heard.'
+    : run.firstTick > 0 ? ` Motion from where it was at ${run.start.toFixed(3)} s, the first that this page has.` : '';
   return {figure, title, unit: 'm', note: (note + origin).trim(), series: axes.flatMap((axis) => [
-    derived(axes.length > 1 ? axis : 'estimated', axes.length > 1 ? `axis-${axis}` : 'computed', `com_motion_${axis}`),
+    derived(axes.length > 1 ? axis : 'estimated', axes.length > 1 ? `axis-${axis}` : 'computed', `com_motion[${'xyz'.indexOf(axis)}]`),
     derived(axes.length > 1 ? `${axis}, true` : 'true', axes.length > 1 ? `axis-${axis}-thin` : 'truth',
-      `com_motion_true_${axis}`),
-    ...(axes.length > 1 ? [] : [derived('desired', 'desired', `com_motion_desired_${axis}`)]),
+      `com_motion_true[${'xyz'.indexOf(axis)}]`),
+    ...(axes.length > 1 ? [] : [derived('desired', 'desired', `com_motion_desired[${'xyz'.indexOf(axis)}]`)]),
   ])};
 }
 
@@ -24,23 +34,22 @@ const push = (figure) => ({figure, title: 'External push, magnitude', unit: 'N',
 const UP_TO_LIMITS = {upToLimits: true, note: `Drawn up to ${LIMITS_SHOWN} times the limit.`};
 
 function resultantConditions(figure) {
-  return [['a', 'y', 1, 'l_y/2 > |M_x| / |F_z|, resultant in frame O (37)'],
-    ['b', 'x', 0, 'l_x/2 > |M_y| / |F_z|, resultant in frame O (38)']].map(([letter, axis, i, title]) => ({
+  return [['a', 1, 'l_y/2 > |M_x| / |F_z|, resultant in frame O (37)'],
+    ['b', 0, 'l_x/2 > |M_y| / |F_z|, resultant in frame O (38)']].map(([letter, i, title]) => ({
     figure: figure && `${figure}${letter}`, title, unit: 'm', ...UP_TO_LIMITS, series: [
-      derived('measured', 'measured', `cop_measured_abs_${axis}`),
-      derived('computed', 'computed', `cop_computed_abs_${axis}`),
+      derived('measured', 'measured', `cop_measured_abs[${i}]`),
+      derived('computed', 'computed', `cop_computed_abs[${i}]`),
       series('limit', 'limit', 'balance_torque_t', `cop_limit[${i}]`)]}));
 }
 
 function footConditions(run, figure, foot) {
   const {name} = run.robot.feet[foot];
-  const limits = {friction: 'μ_s', yaw: 'μ_z', roll: 'l_y/2', pitch: 'l_x/2'};
-  return CONDITIONS.map(({key, number, unit, text}, i) => ({
+  return CONDITIONS.map(({key, number, unit, limit, text}, i) => ({
     figure: figure && `${figure}${'abcd'[i]}`, unit, ...UP_TO_LIMITS,
-    title: `${limits[key]} > ${text}, ${name} foot (${number})`, series: [
-      derived('measured', 'measured', `${name}_${key}_ratio_measured`),
-      derived('computed', 'computed', `${name}_${key}_ratio_computed`),
-      derived('limit', 'limit', `${name}_${key}_limit`)]}));
+    title: `${limit} > ${text}, ${name} foot (${number})`, series: [
+      derived('measured', 'measured', `foot[${foot}].ratio_measured.${key}`),
+      derived('computed', 'computed', `foot[${foot}].ratio_computed.${key}`),
+      derived('limit', 'limit', `foot[${foot}].limit.${key}`)]}));
 }
 
 /** Measured of both feet, then computed, which is drawn over it. */
@@ -113,8 +122,8 @@ const SECTIONS = {
     comMotion(run, '19a', 'COM motion, lateral (y)', ['y'], SUPPORT_NOTE), footMotion('19b', run, 1, 2),
     footMotion('20a', run, 1, 2, 'As 19b: zoom in on the contact.'),
     {figure: '20b', title: 'Vertical force on the left foot', unit: 'N', series: [
-      derived('measured', 'measured', `${run.robot.feet[1].name}_load_measured`),
-      derived('computed', 'computed', `${run.robot.feet[1].name}_load_computed`)]},
+      derived('measured', 'measured', 'foot[1].load_measured'),
+      derived('computed', 'computed', 'foot[1].load_computed')]},
     bodyRoll('21', 'a: first double support; b: second, with balancing.'),
     ...resultantConditions('22'), ...footConditions(run, '23', 0), ...footConditions(run, '24', 1)],
 };
@@ -124,6 +133,11 @@ function defaults(run) {
     ...resultantConditions(''), ...run.robot.feet.flatMap((_, f) => footConditions(run, '', f))];
 }
 
+/** Which torque torque_share is of: the nearest to the truth. */
+const torqueDrawn = (run) => (run.find('ground_truth_t', 'joint_torque[0]') ? 'true torque of the motor'
+  : run.find('bridge_status_t', 'applied_torque[0]') ? 'torque as the bridge ordered it, stiffness and damping included'
+    : 'commanded torque, without stiffness and damping');
+
 /** What every run is looked at for. */
 function common(run, covered) {
   const legs = run.robot.feet.map((foot, f) => {
@@ -131,24 +145,23 @@ function common(run, covered) {
     for (let b = foot.body; run.robot.bodies[b].joint >= 0; b = run.robot.bodies[b].parent) {
       joints.unshift(run.robot.bodies[b].joint);
     }
-    return {title: `Torques of the ${foot.name} leg, of their limits`, unit: '%', limits: [-100, 100], note: `Drawn: ${torqueOf(run).text}.`,
-      series: joints.map((j, i) => derived(run.robot.joints[j].name, `hue-${i}`,
-        `torque_share_${run.robot.joints[j].name}`)), key: `leg-${f}`};
+    return {title: `Torques of the ${foot.name} leg, of their limits`, unit: '%', limits: [-100, 100], note: `Drawn: ${torqueDrawn(run)}.`,
+      series: joints.map((j, i) => derived(run.robot.joints[j].name, `hue-${i}`, `torque_share[${j}]`)), key: `leg-${f}`};
   });
   const eta = (label, role, field) => series(label, role, 'joint_command_t', field);
   return [
     {title: 'Vertical force of the ground on each foot', unit: 'N', series: ofFeet(run, (foot, f, what) =>
-      derived(`${foot.name}, ${what}`, `foot-${f}-${what}`, `${foot.name}_load_${what}`))},
+      derived(`${foot.name}, ${what}`, `foot-${f}-${what}`, `foot[${f}].load_${what}`))},
     {title: 'η: the right foot\'s share of F_z (61)', unit: '', series: [
       eta('commanded', 'computed', 'eta'), eta('optimal (71)', 'desired', 'eta_optimal'),
       eta('lower bound', 'limit', 'eta_min'), eta('upper bound', 'limit', 'eta_max')]},
     ...legs,
     {title: 'COM error', unit: 'm',
-      series: ['x', 'y', 'z'].map((axis) => derived(axis, `axis-${axis}`, `com_error_${axis}`))},
+      series: ['x', 'y', 'z'].map((axis, i) => derived(axis, `axis-${axis}`, `com_error[${i}]`))},
     {title: 'Orientation error of the body', unit: 'rad', series: ['x', 'y', 'z'].map((axis, i) =>
       series(axis, `axis-${axis}`, 'task_torque_t', `body_orientation_error[${i}]`))},
     {title: 'Estimator: base position, estimated less true', unit: 'm',
-      series: [...['x', 'y', 'z'].map((axis) => derived(axis, `axis-${axis}`, `base_position_error_${axis}`)),
+      series: [...['x', 'y', 'z'].map((axis, i) => derived(axis, `axis-${axis}`, `base_position_error[${i}]`)),
         derived('3 σ of the norm', 'limit', 'base_position_bound')]},
     {title: 'Estimator: tilt error', unit: 'rad',
       series: [derived('tilt', 'computed', 'base_tilt_error'), derived('3 σ', 'limit', 'base_tilt_bound')]},
@@ -171,8 +184,7 @@ export function figuresFor(run) {
 
 /** The signal that a series shows of `run`; undefined when it has none. */
 export function findSignal(run, {type, field, name}) {
-  if (name) return run.signals.get(name);
-  return type === 'derived' ? run.signals.get(`derived.${field}`) : run.find(type, field);
+  return name ? run.signals.get(name) : run.find(type, field);
 }
 
 /** A panel of one signal, from the search. */

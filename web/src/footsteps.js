@@ -1,12 +1,12 @@
 // Where the feet stood, where they are to come down, and from where steps bring the COM to rest: of a run's signals alone.
-import {noisyLoad} from './derived.js';
 import {Samples, pose, vector} from './samples.js';
 
 const BOUNCE = 0.1;  // s without a load that leave a footprint what it is
 const SLID = 0.02;   // m, from above, that make it another one
 const ROLLED = 0.01;  // m that its centre is higher than when it first stood firmly: it rolls off
 const COVERED = 0.04;  // m between two prints of a foot of which one would hide the other
-const FIRM = 5;  // noisy loads, of a foot that stands firmly: a quarter of the weight
+const LIGHT = 0.05, FIRM = 0.25;  // of the weight, of a foot that stands where it is planned to; of one that stands firmly
+const GRAVITY = 9.80665;  // m/s²
 export const FOOTSTEPS = 'steps.footsteps_t';
 export const PLANNED = 3;  // footholds, at the most
 const CORNERS = 16;        // of a region, at the most
@@ -27,7 +27,7 @@ export class Footprints {
   constructor(run) {
     this.run = run;
     this.list = [];
-    this.light = noisyLoad(run);
+    this.weight = GRAVITY * run.robot.mass;
   }
 
   async load() {
@@ -61,8 +61,8 @@ export class Footprints {
     if (Number.isNaN(contact + load)) return;
     const time = this.run.timeAt(row);
     let open = this.#open[foot];
-    const firm = load > FIRM * this.light;
-    if (!firm && !(contact > 0 && load > this.light)) {
+    const firm = load > FIRM * this.weight;
+    if (!firm && !(contact > 0 && load > LIGHT * this.weight)) {
       if (open && time - open.loaded > BOUNCE) {
         open.to = open.loaded;
         this.#open[foot] = undefined;
@@ -135,16 +135,4 @@ export function regionsAt(samples, row) {
     return Array.from({length: upTo(CORNERS, count)}, (__, i) => [samples.at(`region_x[${steps * CORNERS + i}]`, row),
       samples.at(`region_y[${steps * CORNERS + i}]`, row), samples.at('region_height', row)]);
   });
-}
-
-/** Whether a point is inside a convex region, corners anticlockwise. */
-export const isInside = (region, [x, y]) => region.length > 2 && region.every(([ax, ay], i) => {
-  const [bx, by] = region[(i + 1) % region.length];
-  return (bx - ax) * (y - ay) - (by - ay) * (x - ax) >= 0;
-});
-
-/** The least number of steps in whose region the point is; undefined: in none. */
-export function stepsThatCatch(regions, point) {
-  const steps = regions.findIndex((region) => isInside(region, point));
-  return steps < 0 ? undefined : steps;
 }

@@ -3,7 +3,6 @@ import {KEYS, playerBar} from './bar.js';
 import {Control, Hand} from './live/control.js';
 import {CONTROL_KEYS, controlPanel} from './live/control_panel.js';
 import {embeddedRuns} from './data.js';
-import {addDerivedSignals, findPhases} from './derived.js';
 import {element, saveNamed} from './dom.js';
 import {changesOf, figuresFor} from './figures.js';
 import {FOOTSTEPS} from './footsteps.js';
@@ -11,6 +10,7 @@ import {grabbing} from './live/grab.js';
 import {linkButton} from './link.js';
 import {LiveFeed, firstTicks, followGrowth, showEnd} from './live/live.js';
 import {NoPicture, has3D} from './no_picture.js';
+import {findPhases} from './phases.js';
 import {Player} from './player.js';
 import {PanelGrid, TimeView} from './plots.js';
 import {Printer} from './print.js';
@@ -155,8 +155,8 @@ function rowsNote(run) {
   return element('p', {class: 'note rows-note'},
     `${count} rows for ${run.meta.run.ticks - run.firstTick} ticks: every tick near the run's ends and its main events`
     + `${missing ? ` (${missing} more events found no room)` : ''}, elsewhere one in up to ${largest} (${quantity(largest * run.period, 's')}). `
-    + 'There a curve shows single ticks, and its shade reaches from the least to the largest of all of them; what is computed here from '
-    + 'several signals has no shade. The log has every tick: poise log cut and poise report show any stretch of it.');
+    + 'There a curve shows single ticks, and its shade reaches from the least to the largest of all of them. '
+    + 'The log has every tick: poise log cut and poise report show any stretch of it.');
 }
 
 async function start() {
@@ -167,7 +167,6 @@ async function start() {
   }
   const runs = embeddedRuns(document), [run, ...others] = runs;
   if (!run) throw new Error('this page holds no run: write one with poise report');
-  for (const r of runs) addDerivedSignals(r);
   const feed = run.meta.live ? new LiveFeed(run) : undefined;
   const player = new Player(run);
   header(runs, feed, player);

@@ -5,8 +5,7 @@ export class Samples {
   #signals = new Map();
 
   async load(run, wanted) {
-    const found = Object.entries(wanted).map(([name, [type, field]]) =>
-      [name, type === 'derived' ? run.signals.get(`derived.${field}`) : run.find(type, field)]);
+    const found = Object.entries(wanted).map(([name, [type, field]]) => [name, run.find(type, field)]);
     await Promise.all(found.filter(([, s]) => s).map(([name, s]) => {
       this.#signals.set(name, s);
       return s.load();

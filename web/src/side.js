@@ -1,6 +1,7 @@
 // What holds at the time cursor, and the events.
 import {element} from './dom.js';
-import {FOOTSTEPS, plannedSignals, regionsAt, stepsThatCatch} from './footsteps.js';
+import {DERIVED} from './figures.js';
+import {FOOTSTEPS} from './footsteps.js';
 import {formatNumber, quantity} from './units.js';
 
 const DIGITS = 3;
@@ -36,7 +37,7 @@ export class Readout {
 /** [name, signals, text of their values] */
 function rowsOf(run) {
   const find = (type, field) => run.find(type, field);
-  const derived = (name) => run.signals.get(`derived.${name}`);
+  const derived = (...fields) => fields.map((field) => find(DERIVED, field));
   const named = (signal) => ([v]) => signal.valueNames?.[v] ?? formatNumber(v);
   const metres = (values) => quantity(values, 'm', DIGITS, true);
   const newton = (values) => quantity(values, 'N', DIGITS, true);
@@ -51,32 +52,23 @@ function rowsOf(run) {
     ['plan', [plan], plan && named(plan)], ['controller', [status], status && named(status)], ['bridge', [bridge], bridge && named(bridge)],
     ['η', [find('joint_command_t', 'eta')], ([v]) => formatNumber(v, DIGITS)],
     ['CoP computed x, y', ['cop[0]', 'cop[1]'].map((f) => find('balance_torque_t', f)), metres],
-    ['CoP measured x, y', [derived('cop_measured_x'), derived('cop_measured_y')], metres],
-    ['COM error x, y, z', ['x', 'y', 'z'].map((a) => derived(`com_error_${a}`)), metres],
-    ['push', [derived('push_magnitude')], newton],
+    ['CoP measured x, y', derived('cop_measured[0]', 'cop_measured[1]'), metres],
+    ['COM error x, y, z', derived('com_error[0]', 'com_error[1]', 'com_error[2]'), metres],
+    ['push', derived('push_magnitude'), newton],
     ['step', step, (v) => (Number.isNaN(v[0]) ? '–' : v[0] > 0 ? `${feet[v[2]]}, ${step[0].valueNames[v[0]]}: ${step[1].valueNames[v[1]]}` : 'none')],
     ...stepRows(run),
-    ...run.robot.feet.flatMap((foot) => ['measured', 'computed'].map((kind) =>
-      [`${foot.name} load, ${kind}`, [derived(`${foot.name}_load_${kind}`)], newton])),
+    ...run.robot.feet.flatMap((foot, f) => ['measured', 'computed'].map((kind) =>
+      [`${foot.name} load, ${kind}`, derived(`foot[${f}].load_${kind}`), newton])),
   ].filter(([, signals]) => signals.every(Boolean));
 }
 
 /** Of a run whose planner makes steps. */
 function stepRows(run) {
   if (!run.find(FOOTSTEPS, 'stance')) return [];
-  const names = Object.entries(plannedSignals());
-  const capture = ['0', '1'].map((i) => run.find('planner_status_t', `capture_point[${i}]`));
-  const caught = (values) => {
-    const byName = new Map(names.map(([name], i) => [name, values[i]]));
-    if (Number.isNaN(byName.get('stance'))) return '–';
-    const regions = regionsAt({at: (name) => byName.get(name) ?? NaN}, 0);
-    if (regions.every((region) => region.length === 0)) return 'on both feet';
-    const steps = stepsThatCatch(regions, values.slice(names.length));
-    return steps === undefined ? 'beyond 2 steps' : `${steps} step${steps === 1 ? '' : 's'}`;
-  };
-  const signals = names.map(([, [type, field]]) => run.find(type, field));
+  const caught = ([stance, steps]) => (Number.isNaN(stance) ? '–' : Number.isNaN(steps) ? 'on both feet'
+    : steps > 2 ? 'beyond 2 steps' : `${steps} step${steps === 1 ? '' : 's'}`);
   const touchDown = run.find(FOOTSTEPS, 'touch_down[0]'), planned = run.find(FOOTSTEPS, 'planned');
-  return [['capture point within', [...signals, ...capture], caught],
+  return [['capture point within', [run.find(FOOTSTEPS, 'stance'), run.find(DERIVED, 'capture_steps')], caught],
     ['next touch-down in', [planned, touchDown], ([count, time]) => (Number.isNaN(count) ? '–' : count > 0 ? quantity([time], 's', DIGITS, true) : 'none planned')]];
 }
 

@@ -5,23 +5,7 @@ export function rotate([w, x, y, z], [a, b, c]) {
   return [a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx];
 }
 
-export const conjugate = ([w, x, y, z]) => [w, -x, -y, -z];
 export const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
-export const subtract = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-export const cross = (a, b) =>
-  [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-
-/** A wrench of frame `from` (pose {position, orientation}) about the origin and in the axes of frame `to`. */
-export function transformWrench(to, from, {force, moment}) {
-  const f = rotate(from.orientation, force);
-  const m = add(rotate(from.orientation, moment), cross(subtract(from.position, to.position), f));
-  const back = conjugate(to.orientation);
-  return {force: rotate(back, f), moment: rotate(back, m)};
-}
-
-/** m, (r_x, r_y) of (37), (38). */
-export const centerOfPressure = ({force, moment}) => [-moment[1] / force[2], moment[0] / force[2]];
 
 /** Convex hull in x and y of points [x, y, ...], anticlockwise. */
 export function convexHull(points) {

@@ -20,7 +20,7 @@ export function decodeBatch(buffer, run) {
   let at = HEADER;
   const take = (type, wanted) => {
     for (const [name, signal] of run.signals) {
-      if (!signal.append || signal.integer !== wanted) continue;
+      if (signal.integer !== wanted) continue;
       if (at + count * type.BYTES_PER_ELEMENT > buffer.byteLength) throw new Error('a batch of the stream is too short');
       values[name] = new type(buffer, at, count);
       at += count * type.BYTES_PER_ELEMENT;

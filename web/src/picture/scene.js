@@ -1,7 +1,7 @@
 // The robot in 3D with contact wrenches, centre of pressure and push; from above in the corner.
 import {Color, Group, Mesh, MeshBasicMaterial, OrthographicCamera, SphereGeometry, Vector3} from 'three';
 import {CraneView} from './crane.js';
-import {lightLoad} from '../derived.js';
+import {DERIVED} from '../figures.js';
 import {element} from '../dom.js';
 import {GroundBlocks} from './ground.js';
 import {Arrow, Block, mark, Outline} from './markers.js';
@@ -53,17 +53,18 @@ function contactSignals(run) {
     ...pose(`sole${f}`, truth ? 'ground_truth_t' : 'planner_status_t', `foot_pose[${f}]`),
     ...vector(`measured${f}.force`, 'robot_sensors_t', `foot_wrench[${f}].force`),
     ...vector(`measured${f}.moment`, 'robot_sensors_t', `foot_wrench[${f}].moment`),
+    ...vector(`measured${f}.cop`, DERIVED, `foot[${f}].cop_measured`, 2),
     ...vector(`computed${f}.force`, 'joint_command_t', `foot_wrench[${f}].force`),
     ...vector(`computed${f}.moment`, 'joint_command_t', `foot_wrench[${f}].moment`),
+    ...vector(`computed${f}.cop`, DERIVED, `foot[${f}].cop_computed`, 2),
     [`contact${f}`]: ['support_plan_t', `in_contact[${f}]`],
   })), pose('frame', 'balance_torque_t', 'frame_o'), vector('cop', 'balance_torque_t', 'cop', 2),
   vector('corner_x', 'balance_torque_t', 'corner_x', REGION_CORNERS),
   vector('corner_y', 'balance_torque_t', 'corner_y', REGION_CORNERS),
   vector('capture', 'planner_status_t', 'capture_point'), vector('step', 'planner_status_t', 'step_position'),
-  vector('push', 'external_push_t', 'force'),
+  vector('push', 'external_push_t', 'force'), {pushed: [DERIVED, 'push_magnitude']},
   vector('point', 'external_push_t', 'point'), {
-    'measured_cop[0]': ['derived', 'cop_measured_x'], 'measured_cop[1]': ['derived', 'cop_measured_y'],
-    'desired_cop[0]': ['derived', 'cop_desired_x'], 'desired_cop[1]': ['derived', 'cop_desired_y'],
+    ...vector('measured_cop', DERIVED, 'cop_measured_place'), ...vector('desired_cop', DERIVED, 'cop_desired', 2),
     num_corners: ['balance_torque_t', 'num_corners'], step_needed: ['planner_status_t', 'step_needed'],
     active_x: ['balance_torque_t', 'active_x'], active_y: ['balance_torque_t', 'active_y']});
 }
@@ -77,7 +78,6 @@ export class SceneView extends View3D {
     this.samples = new Samples();
     this.row = 0;
     this.visible = true;
-    this.leastLoad = lightLoad(run);
     this.show = {forces: true, moments: false, pressure: true, com: true, steps: true};
     this.note = element('p', {class: 'stale', role: 'status', hidden: true});
     host.append(this.note);
@@ -145,6 +145,7 @@ export class SceneView extends View3D {
       measured: flat('disc', 'measured', 0.0075)};
     this.frame.add(this.marks.desired, this.marks.computed);
     this.measuredFrame = new Group();
+    this.marks.measured.position.z = 0.001;
     this.measuredFrame.add(this.marks.measured);
     this.comMark = flat('cross', 'com', 0.014);
     this.com = new Mesh(new SphereGeometry(0.022, 20, 14), new MeshBasicMaterial({depthTest: false, transparent: true}));
@@ -197,7 +198,7 @@ export class SceneView extends View3D {
     }
     const force = samples.vector('push', row);
     const point = samples.vector('point', row);
-    const pushed = Math.hypot(...force) > LEAST_PUSH;
+    const pushed = samples.at('pushed', row) > LEAST_PUSH;
     const push = force.map((f) => f * METRES_PER_NEWTON * 1.5);
     this.pushArrow.set(point.map((p, i) => p - push[i]), pushed ? push : [0, 0, 0]);
     this.crane.set(samples.vector('crane', row), samples.vector('crane_force', row), samples.at('crane_share', row));
@@ -241,13 +242,11 @@ export class SceneView extends View3D {
       if (samples.at(`contact${f}`, row) > 0) polygon.push(...corners);
       for (const kind of ['measured', 'computed']) {
         const arrows = this.arrows[f];
-        const [fx, fy, fz] = samples.vector(`${kind}${f}.force`, row);
         const moment = samples.vector(`${kind}${f}.moment`, row);
         // What the ground does to the robot, where it acts on the sole.
-        const loaded = Math.abs(fz) > this.leastLoad;
-        const at = loaded ? add(sole.position, rotate(sole.orientation, [-moment[1] / fz, moment[0] / fz, 0]))
-          : sole.position;
-        const force = rotate(sole.orientation, [-fx, -fy, -fz].map((v) => v * METRES_PER_NEWTON));
+        const cop = samples.vector(`${kind}${f}.cop`, row, 2), loaded = cop.every(Number.isFinite);
+        const at = loaded ? add(sole.position, rotate(sole.orientation, [...cop, 0])) : sole.position;
+        const force = rotate(sole.orientation, samples.vector(`${kind}${f}.force`, row).map((v) => -v * METRES_PER_NEWTON));
         arrows[kind].set(at, show.forces && loaded ? force : [0, 0, 0]);
         const turn = rotate(sole.orientation, moment.map((v) => -v * METRES_PER_NEWTON_METRE));
         arrows[`${kind}Moment`].set(sole.position, show.moments ? turn : [0, 0, 0]);
@@ -283,11 +282,10 @@ export class SceneView extends View3D {
       if (object.visible) object.position.set(cop[0], cop[1], 0.001);
     };
     put(this.marks.computed, 'cop');
-    // What is read in this tick is of the command, and in the frame, of the tick before.
-    const before = samples.pose('frame', row - 1);
-    put(this.marks.measured, 'measured_cop', [...before.position, ...before.orientation].every(Number.isFinite));
-    if (this.marks.measured.visible) place(this.measuredFrame, before);
     put(this.marks.desired, 'desired_cop', balancing);
+    const measured = samples.vector('measured_cop', row);
+    this.marks.measured.visible = measured.every(Number.isFinite);
+    if (this.marks.measured.visible) place(this.measuredFrame, {position: measured, orientation: frame.orientation});
   }
 
   /** Both soles in the view from above; in steps, so that it holds still. */
