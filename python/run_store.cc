@@ -11,9 +11,13 @@
 #include <cstring>
 #include <map>
 #include <numeric>
+#include <set>
 
 #include "components/framework/bus/packet_filter.h"
+#include "components/robot_files/robot_files.h"
+#include "derived/message_traits.hpp"
 #include "fmt/format.h"
+#include "logging/derived/derived_signals.h"
 #include "logging/log_messages.h"
 
 namespace poise::python {
@@ -134,6 +138,64 @@ void RunStore::Index() {
     if (!lane.external) SortByTick(lane.channel);
   }
   std::erase_if(channels_, [](const auto& channel) { return channel->ticks.empty(); });
+  AddDerived();
+}
+
+void RunStore::AddDerived() {
+  const bool taken = std::ranges::any_of(
+      channels_, [](const auto& channel) { return channel->name == logging::kDerivedChannel; });
+  if (channels_.empty() || taken) return;
+  try {
+    model_ = robot::LoadRobotTexts(robot_, urdf_);
+  } catch (const robot::RobotError&) {
+    return;
+  }
+  const logging::DerivedSignals signals(spec_, *model_);
+  if (!signals.any()) return;
+  const MessageType* const type = FindMessageType(MessageTraits<derived::signals_t>::kName);
+  channels_.push_back(
+      std::make_unique<StoredChannel>(logging::kDerivedChannel, *type, signals.counts()));
+  derived_ = channels_.back().get();
+}
+
+void RunStore::ComputeDerived() const {
+  struct Source {
+    const StoredChannel* channel;
+    size_t row = 0;
+    int64_t tick() const { return row < channel->ticks.size() ? channel->ticks[row] : INT64_MAX; }
+  };
+  std::vector<Source> sources;
+  std::set<std::string_view> types;  // of several channels with one type the first is taken
+  for (const auto& channel : channels_) {
+    if (channel.get() != derived_ && types.insert(channel->type->name).second) {
+      sources.push_back({channel.get()});
+    }
+  }
+  logging::DerivedSignals signals(spec_, *model_);
+  while (true) {
+    logging::TickMessages messages;
+    messages.tick = std::ranges::min(sources, {}, &Source::tick).tick();
+    if (messages.tick == INT64_MAX) return;
+    bool any = false;
+    for (Source& source : sources) {
+      for (; source.tick() == messages.tick; ++source.row) {
+        const uint8_t* const data = Message(*source.channel, source.row);
+        if (!messages.Take(source.channel->type->name, {data, source.channel->layout.size()})) {
+          continue;
+        }
+        any = true;
+        messages.utime = ReadInt64(data + source.channel->type->run_id_offset + 16);
+      }
+    }
+    if (!any) continue;
+    const int64_t tick = messages.tick;
+    const derived::signals_t& derived = signals.Next(std::move(messages));
+    const size_t at = derived_bytes_.size();
+    derived_bytes_.resize(at + derived_->layout.size());
+    derived.encode(derived_bytes_.data() + at, 0, static_cast<int>(derived_->layout.size()));
+    derived_->ticks.push_back(tick);
+    derived_->offsets.push_back(at);
+  }
 }
 
 RunStore::RunStore(const RunSpec& spec, std::string scenario)
@@ -168,11 +230,17 @@ void RunStore::Finish(std::optional<logging::RunRecord> record) {
   const std::lock_guard lock(record_mutex_);
   record_ = std::move(record);
   std::erase_if(channels_, [](const auto& channel) { return channel->ticks.empty(); });
+  AddDerived();
 }
 
 const StoredChannel* RunStore::Find(std::string_view name) const {
   for (const auto& channel : channels_) {
-    if (channel->name == name) return channel.get();
+    if (channel->name != name) continue;
+    if (channel.get() == derived_) {
+      CheckUnchanged();
+      std::call_once(derived_once_, [this] { ComputeDerived(); });
+    }
+    return channel.get();
   }
   return nullptr;
 }

@@ -47,12 +47,13 @@ class RunStore {
   void Finish(std::optional<logging::RunRecord> record);
 
   const std::vector<std::unique_ptr<StoredChannel>>& channels() const { return channels_; }
-  /// nullptr: none of that name, or it has no messages of numbers.
+  /// nullptr: none of that name, or it has no messages of numbers. What DERIVED has is computed
+  /// when it is first asked for. Throws LogError likewise.
   const StoredChannel* Find(std::string_view name) const;
   /// The encoded message `row` of a channel. Throws LogError when the log's file is no longer what
   /// it was.
   const uint8_t* Message(const StoredChannel& channel, size_t row) const {
-    return bytes_ + channel.offsets[row];
+    return (&channel == derived_ ? derived_bytes_.data() : bytes_) + channel.offsets[row];
   }
   /// Throws LogError when the log's file is no longer what it was. Called before Message.
   void CheckUnchanged() const;
@@ -71,6 +72,9 @@ class RunStore {
 
  private:
   void Index();
+  /// Adds the channel of the derived signals, empty, where the run tells any.
+  void AddDerived();
+  void ComputeDerived() const;
 
   std::string log_;
   RunSpec spec_;
@@ -84,6 +88,10 @@ class RunStore {
   int64_t modified_ = 0;
   int fd_ = -1;
   int64_t damages_ = 0;
+  std::optional<robot::RobotModel> model_;  // what signals are derived with
+  StoredChannel* derived_ = nullptr;        // in channels_; nullptr: none
+  mutable std::once_flag derived_once_;
+  mutable std::vector<uint8_t> derived_bytes_;
   mutable std::mutex record_mutex_;
   mutable std::optional<logging::RunRecord> record_;
 };

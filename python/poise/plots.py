@@ -5,8 +5,6 @@ Each takes a Run, draws into `axes` where given, and returns the matplotlib figu
 
 import numpy as np
 
-from .balance import center_of_pressure
-
 
 def _axes(axes, rows=1, **size):
     if axes is not None:
@@ -31,15 +29,11 @@ def _finish(figure, axes):
 
 
 def com_error(run, axes=None):
-    """How far the centre of mass is from its reference: forward, lateral, vertical (mm)."""
-    truth, plan = run["GROUND_TRUTH"], run["SUPPORT_PLAN"]
-    _, i, j = np.intersect1d(truth.tick, plan.tick, return_indices=True)
-    error = 1e3 * (truth.com_position[i] - plan["com_reference.position"][j])
-    # In steps a centre of pressure is followed, and the COM has no reference.
-    error[plan.com_follows[j] != 0, :2] = np.nan
+    """How far the centre of mass truly is from its reference: forward, lateral, vertical (mm)."""
+    derived = run["DERIVED"]
     figure, axes = _axes(axes)
     for k, name in enumerate(("forward", "lateral", "vertical")):
-        axes[0].plot(truth.time[i], error[:, k], label=name)
+        axes[0].plot(derived.time, 1e3 * derived.com_error_true[:, k], label=name)
     axes[0].set_ylabel("COM error (mm)")
     return _finish(figure, axes)
 
@@ -59,17 +53,13 @@ def cop(run, axes=None):
 
 
 def load_share(run, axes=None):
-    """η: the right foot's share of the vertical force, as commanded, with its feasible interval, and as measured."""
-    command, truth = run["JOINT_COMMAND"], run["GROUND_TRUTH"]
+    """η: the right foot's share of the vertical force, as commanded, with its feasible interval, and as it truly was."""
+    derived = run["DERIVED"]
     figure, axes = _axes(axes)
-    told = (command.eta_feasible != 0) | (command.eta_max != 0)
-    if told.any():  # a controller that distributes nothing leaves all of it zero
-        low, high, eta = (np.where(told, values, np.nan) for values in (command.eta_min, command.eta_max, command.eta))
-        axes[0].fill_between(command.time, low, high, alpha=0.2, label="feasible")
-        axes[0].plot(command.time, eta, label="commanded")
-    force = truth["foot_wrench.force"][:, :, 2]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        axes[0].plot(truth.time, force[:, 0] / force.sum(axis=1), label="true", linewidth=0.8)
+    if np.isfinite(derived.share_commanded).any():
+        axes[0].fill_between(derived.time, derived.share_least, derived.share_most, alpha=0.2, label="feasible")
+        axes[0].plot(derived.time, derived.share_commanded, label="commanded")
+    axes[0].plot(derived.time, derived.share_true, label="true", linewidth=0.8)
     axes[0].set_ylim(-0.05, 1.05)
     axes[0].set_ylabel("right foot's share")
     return _finish(figure, axes)
@@ -77,30 +67,26 @@ def load_share(run, axes=None):
 
 def foot_forces(run, axes=None):
     """Each foot's vertical force on the ground (N): as computed and as it truly was."""
-    command, truth = run["JOINT_COMMAND"], run["GROUND_TRUTH"]
-    names = truth.names("foot_wrench.force") or ["right", "left"]
+    derived = run["DERIVED"]
+    names = derived.names("foot.load_true") or ["right", "left"]
+    computed = derived["foot.load_computed"]
     figure, axes = _axes(axes, 2)
-    computed = -command["foot_wrench.force"][:, :, 2]
-    told = (command.conditions_met != 0).any(axis=1) | (computed != 0).any(axis=1)
     for f in (0, 1):
-        if told.any():  # a controller that computes no wrenches leaves all of them zero
-            axes[f].plot(command.time, np.where(told, computed[:, f], np.nan), label="computed")
-        axes[f].plot(truth.time, -truth["foot_wrench.force"][:, f, 2], label="true", linewidth=0.8)
+        if np.isfinite(computed).any():
+            axes[f].plot(derived.time, computed[:, f], label="computed")
+        axes[f].plot(derived.time, derived["foot.load_true"][:, f], label="true", linewidth=0.8)
         axes[f].set_ylabel(f"{names[f]} (N)")
     return _finish(figure, axes)
 
 
 def foot_cop(run, axes=None):
     """Each foot's own centre of pressure in its sole's frame (mm), forward and lateral, as it truly was."""
-    truth = run["GROUND_TRUTH"]
-    wrench = np.concatenate([truth["foot_wrench.force"], truth["foot_wrench.moment"]], axis=2)
-    loaded = np.abs(wrench[:, :, 2]) > 0.02 * run.robot.total_mass * 9.80665  # else it is noise
-    places = np.where(loaded[:, :, None], 1e3 * center_of_pressure(wrench), np.nan)
-    names = truth.names("foot_wrench.force") or ["right", "left"]
+    derived = run["DERIVED"]
+    names = derived.names("foot.cop_true") or ["right", "left"]
     figure, axes = _axes(axes, 2)
     for f in (0, 1):
         for k, name in enumerate(("forward", "lateral")):
-            axes[f].plot(truth.time, places[:, f, k], label=name)
+            axes[f].plot(derived.time, 1e3 * derived["foot.cop_true"][:, f, k], label=name)
         axes[f].set_ylabel(f"{names[f]} CoP (mm)")
     return _finish(figure, axes)
 

@@ -41,11 +41,12 @@ const BELOW = {
   'hw_bridge/drive_emulator': [...BUS, 'hw_bridge/ethercat', 'hw_bridge/ethercat/links', 'hw_bridge/ethercat/emulator'],
   'logging': BUS,
   'logging/recording': [...BUS, 'logging'],
-  'logging/metrics': [...BUS, 'logging'],
-  'logging/events': [...BUS, 'logging', 'logging/metrics'],
-  'logging/export': [...BUS, 'logging'],
+  'logging/derived': [...BUS, 'logging'],
+  'logging/metrics': [...BUS, 'logging', 'logging/derived'],
+  'logging/events': [...BUS, 'logging', 'logging/derived', 'logging/metrics'],
+  'logging/export': [...BUS, 'logging', 'logging/derived'],
   'logging/replay': [...BUS, 'logging'],
-  'python': [...BUS, 'python', 'logging', 'logging/events', 'logging/metrics', 'logging/recording', 'tools/cli', 'tools/scenario', 'tools/report', 'tools/operator', 'tools/run'],
+  'python': [...BUS, 'python', 'logging', 'logging/derived', 'logging/events', 'logging/metrics', 'logging/recording', 'tools/cli', 'tools/scenario', 'tools/report', 'tools/operator', 'tools/run'],
   'python/bindings': [...BUS, 'python', 'python/bindings', 'sim', 'logging', 'logging/metrics', 'tools/scenario', 'tools/report', 'tools/run'],
 };
 /** The libraries of `poise`, each of which uses only those before it. */

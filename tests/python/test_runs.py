@@ -32,7 +32,7 @@ class Runs(unittest.TestCase):
         for name in run.channels:
             with open(os.path.join(self.table, name + ".csv"), newline="") as file:
                 header, *lines = csv.reader(file)
-            exported = {column: np.array([float(line[i]) for line in lines]) for i, column in enumerate(header)}
+            exported = {column: np.array([float(line[i] or "nan") for line in lines]) for i, column in enumerate(header)}
             channel = run[name]
             self.assertEqual(len(channel), len(lines), name)
             numbers = 0
