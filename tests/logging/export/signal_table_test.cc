@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "logging/derived/tick_messages.h"
 #include "poise/emergency_stop_t.hpp"
 #include "tests/logging/log_test_support.h"
 #include "tests/logging/record_fixture.h"
@@ -28,10 +29,13 @@ class SignalTableTest : public testing::Test {
   static RawEvent Event(const char* channel, const T& message) {
     return {channel, message.utime, Encode(message)};
   }
+  /// The log's own channels, without what follows from them.
   std::vector<ChannelColumns> Read(std::vector<RawEvent> events) {
     events.insert(events.begin(), RunInfoEvent(spec_));
     WriteRawLog(path_, events);
-    return ReadColumns(path_, ReadRun(path_));
+    std::vector<ChannelColumns> channels = ReadColumns(path_, ReadRun(path_));
+    std::erase_if(channels, [](const ChannelColumns& c) { return c.name == kDerivedChannel; });
+    return channels;
   }
   static const SignalColumn* Find(const ChannelColumns& channel, const std::string& field) {
     for (const SignalColumn& column : channel.columns) {
