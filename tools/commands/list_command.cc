@@ -10,7 +10,9 @@
 #include "components/framework/optional_ports.h"
 #include "components/robot_files/robot.pb.h"
 #include "components/robot_files/robot_files.h"
+#include "derived/message_traits.hpp"
 #include "fmt/format.h"
+#include "logging/derived/tick_messages.h"
 #include "logging/metrics/metric_needs.h"
 #include "logging/metrics/metrics.h"
 #include "logging/printable.h"
@@ -79,6 +81,7 @@ ChannelsByType GraphChannels() {
       }
     }
   }
+  channels[MessageTraits<derived::signals_t>::kName] = {logging::kDerivedChannel};
   return channels;
 }
 

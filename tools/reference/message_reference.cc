@@ -48,8 +48,11 @@ std::vector<MessageEntry> MessageReference() {
   std::sort(messages.begin(), messages.end(),
             [](const auto& a, const auto& b) { return a.type < b.type; });
   for (MessageEntry& message : messages) {
+    const std::string package = message.type.substr(0, message.type.find('.') + 1);  // of poise ""
     for (const MessageEntry& other : messages) {
-      const std::regex field(fmt::format("\\n\\s*{}\\s", other.type));
+      const std::string name =  // within a package without it
+          other.type.starts_with(package) ? other.type.substr(package.size()) : other.type;
+      const std::regex field(fmt::format("\\n\\s*{}\\s", name));
       if (std::regex_search(message.definition, field)) message.nested.push_back(other.type);
     }
   }
