@@ -85,19 +85,19 @@ std::optional<BalancingIntervals> Balancing(const RunRecord& run) {
   return result;
 }
 
-TickView ViewOf(const RunRecord& run, int64_t tick) {
-  TickView view;
-  view.sensors = run.sensors.at(tick);
-  view.state = run.state.at(tick);
-  view.estimator = run.estimator.at(tick);
-  view.plan = run.plan.at(tick);
-  view.planner = run.planner.at(tick);
-  view.balance = run.balance.at(tick);
-  view.command = run.command.at(tick);
-  view.bridge = run.bridge.at(tick);
-  view.push = run.push.at(tick);
-  view.truth = run.truth.at(tick);
-  return view;
+namespace {
+
+// Of a tick that which is asked for alone: a long run's messages are read from the disk.
+
+TickView FeetOf(const RunRecord& run, int64_t tick) {
+  return {.sensors = run.sensors.at(tick), .state = run.state.at(tick)};
+}
+
+TickView GroundOf(const RunRecord& run, int64_t tick) {
+  return {.plan = run.plan.at(tick),
+          .planner = run.planner.at(tick),
+          .balance = run.balance.at(tick),
+          .truth = run.planner.empty() ? run.truth.at(tick) : nullptr};
 }
 
 RunMessages MessagesOf(const RunRecord& run) {
@@ -105,19 +105,34 @@ RunMessages MessagesOf(const RunRecord& run) {
           !run.truth.empty()};
 }
 
+}  // namespace
+
 std::optional<Wrench> KnownWrench(const RunRecord& run, size_t foot, int64_t tick) {
-  return KnownWrench(run.robot, ViewOf(run, tick), foot);
+  return KnownWrench(run.robot, FeetOf(run, tick), foot);
+}
+
+std::optional<Wrench> ComputedWrench(const RunRecord& run, size_t foot, int64_t tick) {
+  return ComputedWrench({.command = run.command.at(tick)}, foot);
 }
 
 std::optional<Eigen::Vector2d> ComputedCop(const RunRecord& run, int64_t tick) {
-  return ComputedCop(run.robot, MessagesOf(run), ViewOf(run, tick));
+  TickView view = GroundOf(run, tick);
+  view.command = run.command.at(tick);
+  return ComputedCop(run.robot, MessagesOf(run), view);
 }
 
 std::optional<Eigen::Vector2d> MeasuredCop(const RunRecord& run, int64_t tick) {
   const auto placed =
-      MeasuredCop(run.robot, MessagesOf(run), ViewOf(run, tick - 1), ViewOf(run, tick));
+      MeasuredCop(run.robot, MessagesOf(run), GroundOf(run, tick - 1), FeetOf(run, tick));
   if (!placed) return {};
   return placed->cop;
+}
+
+Answer MotorTorque(const RunRecord& run, size_t joint, int64_t tick) {
+  return MotorTorque(
+      MessagesOf(run),
+      {.command = run.command.at(tick), .bridge = run.bridge.at(tick), .truth = run.truth.at(tick)},
+      joint);
 }
 
 std::optional<Wrench> WrenchError(const RunRecord& run, int foot, int64_t tick) {

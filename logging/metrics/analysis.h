@@ -35,15 +35,13 @@ struct BalancingIntervals {
 /// Empty without BALANCE_TORQUE messages; activations 0 when it was never on.
 std::optional<BalancingIntervals> Balancing(const RunRecord& run);
 
-/// What a run holds of a tick, and of any: for logging/derived/definitions.h.
-TickView ViewOf(const RunRecord& run, int64_t tick);
-RunMessages MessagesOf(const RunRecord& run);
-
-/// Those of logging/derived/definitions.h at `tick`: m, (r_x, r_y) in frame O, and the foot's
-/// wrench.
+/// Those of logging/derived/definitions.h at `tick`: m, (r_x, r_y) in frame O; a foot's wrench;
+/// N·m.
 std::optional<Eigen::Vector2d> ComputedCop(const RunRecord& run, int64_t tick);
 std::optional<Eigen::Vector2d> MeasuredCop(const RunRecord& run, int64_t tick);
+std::optional<Wrench> ComputedWrench(const RunRecord& run, size_t foot, int64_t tick);
 std::optional<Wrench> KnownWrench(const RunRecord& run, size_t foot, int64_t tick);
+Answer MotorTorque(const RunRecord& run, size_t joint, int64_t tick);
 
 /// Reading at `tick` less the wrench computed for it (the tick before), robot on environment, sole
 /// frame; empty for a foot out of contact.

@@ -52,7 +52,7 @@ bool Stopped(const RunRecord& run, int64_t tick) {
 /// N·m that a joint's motor gave. None while the bridge does not follow.
 Answer Torque(const RunRecord& run, int64_t tick, size_t joint) {
   if (Stopped(run, tick)) return {};
-  return MotorTorque(MessagesOf(run), ViewOf(run, tick), joint);
+  return MotorTorque(run, joint, tick);
 }
 
 /// The true positions or velocities, else the estimated ones; none while the bridge does not

@@ -76,10 +76,8 @@ void AddFootErrors(MetricList* list) {
 /// N, 0 - F_z (never minus zero) of a foot in contact: computed at `tick`, or read there for the
 /// command before.
 Answer FootLoad(const RunRecord& run, size_t foot, bool measured, int64_t tick) {
-  const joint_command_t* command = run.command.at(measured ? tick - 1 : tick);
-  if (command == nullptr || command->in_contact[foot] == 0 || !TellsFoot(*command, foot)) return {};
-  if (!measured) return 0.0 - command->foot_wrench[foot].force[2];
-  const auto wrench = KnownWrench(run, foot, tick);
+  auto wrench = ComputedWrench(run, foot, measured ? tick - 1 : tick);
+  if (wrench && measured) wrench = KnownWrench(run, foot, tick);
   if (!wrench) return {};
   return 0.0 - (*wrench)[2];
 }
@@ -105,23 +103,19 @@ void AddTangential(MetricList* list) {
   const auto add = [&](const char* name, const char* unit, const char* text, auto size) {
     list->push_back({name, unit, text, [size](const RunRecord& run) {
                        return Maximum(run, [&](int64_t t) -> Answer {
-                         const joint_command_t* command = run.command.at(t);
                          Answer largest;
-                         for (size_t foot = 0; command != nullptr && foot < 2; ++foot) {
-                           if (command->in_contact[foot] == 0 || !TellsFoot(*command, foot)) {
-                             continue;
-                           }
-                           const double value = size(command->foot_wrench[foot]);
-                           largest = std::max(largest.value_or(0), value);
+                         for (size_t foot = 0; foot < 2; ++foot) {
+                           const auto wrench = ComputedWrench(run, foot, t);
+                           if (wrench) largest = std::max(largest.value_or(0), size(*wrench));
                          }
                          return largest;
                        });
                      }});
   };
   add("foot_tangential_force_computed_max", "N", "largest computed (F_x, F_y) of a foot",
-      [](const wrench_t& w) { return std::hypot(w.force[0], w.force[1]); });
+      [](const Wrench& w) { return std::hypot(w[0], w[1]); });
   add("foot_yaw_moment_computed_max", "N·m", "largest computed M_z of a foot",
-      [](const wrench_t& w) { return std::abs(w.moment[2]); });
+      [](const Wrench& w) { return std::abs(w[5]); });
 }
 
 /// Largest less smallest ratio while both feet are in contact.
