@@ -82,12 +82,15 @@ RobotModel RobotModel::WithImuTurned(const Eigen::Matrix3d& turn) const {
   return RobotModel(std::move(parts));
 }
 
+double PeakTorque(const RobotModel& model, size_t joint) {
+  const MotorModel& motor = model.motors()[joint];
+  return std::min(model.joints()[joint].effort, motor.torque_per_ampere() * motor.peak_current);
+}
+
 Eigen::VectorXd PeakTorques(const RobotModel& model) {
   Eigen::VectorXd torque(model.num_joints());
   for (int j = 0; j < model.num_joints(); ++j) {
-    const MotorModel& motor = model.motors()[static_cast<size_t>(j)];
-    torque[j] = std::min(model.joints()[static_cast<size_t>(j)].effort,
-                         motor.torque_per_ampere() * motor.peak_current);
+    torque[j] = PeakTorque(model, static_cast<size_t>(j));
   }
   return torque;
 }

@@ -209,8 +209,10 @@ class RobotModel {
   double total_mass_ = 0;
 };
 
-/// k×1, N·m that each joint gives at most: its effort, or what its motor's peak current gives where
-/// that is less.
+/// N·m that a joint gives at most: its effort, or what its motor's peak current gives where that is
+/// less.
+double PeakTorque(const RobotModel& model, size_t joint);
+/// k×1, of each joint.
 Eigen::VectorXd PeakTorques(const RobotModel& model);
 
 }  // namespace poise::robot

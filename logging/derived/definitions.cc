@@ -162,11 +162,6 @@ std::optional<double> FootError(const support_plan_t& plan, const planner_status
   return planner.foot_pose[foot].position[axis] - plan.foot_reference[foot].position[axis];
 }
 
-double JointTorqueLimit(const robot::RobotModel& robot, size_t joint) {
-  const robot::MotorModel& motor = robot.motors()[joint];
-  return std::min(robot.joints()[joint].effort, motor.torque_per_ampere() * motor.peak_current);
-}
-
 std::optional<double> MotorTorque(const RunMessages& run, const TickView& tick, size_t joint) {
   const auto of = [joint](const auto* message, auto field) -> std::optional<double> {
     if (message == nullptr) return {};

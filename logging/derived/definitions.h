@@ -75,8 +75,6 @@ std::optional<double> ComError(const support_plan_t& plan, const double (&com)[3
 std::optional<double> FootError(const support_plan_t& plan, const planner_status_t& planner,
                                 size_t foot, int axis);
 
-/// N·m, smaller of the robot file's effort and what the motor gives at peak current.
-double JointTorqueLimit(const robot::RobotModel& robot, size_t joint);
 /// N·m that a joint's motor gave: in truth; of a real robot as the bridge ordered it, with what the
 /// drive adds by stiffness and damping; without a bridge as commanded.
 std::optional<double> MotorTorque(const RunMessages& run, const TickView& tick, size_t joint);

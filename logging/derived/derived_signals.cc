@@ -209,7 +209,8 @@ const std::vector<Definition>& Definitions() {
        [](const Inputs& in, signals_t* out) {
          for (size_t joint = 0; joint < out->torque_share.size(); ++joint) {
            const auto torque = MotorTorque(in.run, in.now, joint);
-           if (torque) out->torque_share[joint] = 100 * *torque / JointTorqueLimit(in.robot, joint);
+           if (torque)
+             out->torque_share[joint] = 100 * *torque / robot::PeakTorque(in.robot, joint);
          }
        }},
       {{"foot.load_computed", "foot.cop_computed", "foot.ratio_computed", "foot.limit"},

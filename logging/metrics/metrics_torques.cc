@@ -98,7 +98,7 @@ void AddTorques(MetricList* list) {
                       [](const RunRecord& run, int64_t t, size_t joint) -> Answer {
                         const Answer torque = Torque(run, t, joint);
                         if (!torque) return {};
-                        return 100 * std::abs(*torque) / JointTorqueLimit(run.robot, joint);
+                        return 100 * std::abs(*torque) / robot::PeakTorque(run.robot, joint);
                       }));
   list->push_back(LargestOfJoints("joint_position_beyond", "rad",
                                   "largest distance of a joint beyond its limit of position while "

@@ -107,6 +107,19 @@ py::array_t<double> WrenchTransformOf(const Array& frame, const Array& sole) {
   return result;
 }
 
+py::array_t<double> CopOf(const Array& wrench) {
+  const py::ssize_t count = CountOf(wrench);
+  CheckShape(wrench, "wrench", count, {6});
+  py::array_t<double> result({count, py::ssize_t{2}});
+  const double* const from = wrench.data();
+  double* const to = result.mutable_data();
+  const py::gil_scoped_release released;
+  for (py::ssize_t i = 0; i < count; ++i) {
+    Eigen::Map<Eigen::Vector2d>(to + 2 * i) = balance::CenterOfPressure(WrenchAt(from + 6 * i));
+  }
+  return result;
+}
+
 py::array_t<double> Margins(const Array& wrench, const std::array<double, 4>& limits) {
   const py::ssize_t count = CountOf(wrench);
   CheckShape(wrench, "wrench", count, {6});
@@ -359,6 +372,7 @@ py::tuple Balance(const RobotHandle& robot, const StateArrays& states, const Fee
 void BindBalance(py::module_* module) {
   module->def("frame_o", &FrameOOf);
   module->def("wrench_transform", &WrenchTransformOf);
+  module->def("center_of_pressure", &CopOf);
   module->def("contact_margins", &Margins);
   module->def("ratio", &Ratio);
   module->def("distribute", &Distribute);

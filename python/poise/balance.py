@@ -51,11 +51,8 @@ def resultant(wrenches, frame, soles):
 
 def center_of_pressure(wrench):
     """(37), (38): (..., 2), m, of a wrench in its frame: (−M_y, M_x) / F_z."""
-    wrench = np.asarray(wrench, dtype=float)
-    if wrench.shape[-1:] != (6,):
-        raise ValueError(f"wrench: is {wrench.shape}, must end with (6,)")
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.stack([-wrench[..., 4], wrench[..., 3]], axis=-1) / wrench[..., 2:3]
+    (wrench,), lead = _rows((wrench, 1, (6,), "wrench"))
+    return _poise.center_of_pressure(wrench).reshape(lead + (2,))
 
 
 def contact_margins(wrench, limits):

@@ -168,7 +168,7 @@ TEST_F(DerivedSignalsTest, TorquesAreTheNearestToTheTruthThatTheRunHas) {
     bridge_[t].applied_torque[3] = 8;
     command_[t].torque[3] = 4;
   }
-  const double limit = JointTorqueLimit(Read().robot, 3);
+  const double limit = robot::PeakTorque(Read().robot, 3);
   EXPECT_NEAR(Value("torque_share[3]"), 1000 / limit, 1e-12);
   const auto without = [&](const char* type) {
     Graph* graph = spec_.mutable_graph();

@@ -77,7 +77,7 @@ void FindLoads(RobotCheck* check) {
     const robot::MotorModel& motor = model.motors()[j];
     const auto i = static_cast<Eigen::Index>(j);
     check->loads.push_back({.joint = model.joints()[j].name,
-                            .limit = TorqueLimit(model, j),
+                            .limit = robot::PeakTorque(model, j),
                             .rated = motor.torque_per_ampere() * motor.rated_current,
                             .double_support = both[i],
                             .single_support = single ? (*single)[i] : kNone,

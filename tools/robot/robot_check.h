@@ -18,7 +18,7 @@ namespace poise {
 /// What one joint bears, N·m, unsigned.
 struct JointLoad {
   std::string joint;
-  double limit = 0;           ///< TorqueLimit
+  double limit = 0;           ///< robot::PeakTorque
   double rated = 0;           ///< at the motor's rated current
   double double_support = 0;  ///< in the stance
   /// The worse of the two feet, where the robot stands on one, the COM above its sole's origin.

@@ -51,7 +51,7 @@ Json RobotJson(const robot::RobotModel& model, const RobotDrawing& drawing) {
     json["joints"].push_back({{"name", joint.name},
                               {"lower", joint.lower},
                               {"upper", joint.upper},
-                              {"torque_limit", TorqueLimit(model, i)}});
+                              {"torque_limit", robot::PeakTorque(model, i)}});
   }
   json["feet"] = Json::array();
   for (const robot::FootModel& foot : model.feet()) {

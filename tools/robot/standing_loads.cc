@@ -1,6 +1,5 @@
 #include "tools/robot/standing_loads.h"
 
-#include <algorithm>
 
 #include "components/robot/dynamics.h"
 #include "components/robot/posture.h"
@@ -14,11 +13,6 @@ namespace {
 constexpr std::array kHeights = {1.0, 0.98, 0.95, 0.9};
 
 }  // namespace
-
-double TorqueLimit(const robot::RobotModel& model, size_t joint) {
-  const robot::MotorModel& motor = model.motors()[joint];
-  return std::min(model.joints()[joint].effort, motor.torque_per_ampere() * motor.peak_current);
-}
 
 Eigen::VectorXd HoldingTorque(const robot::RobotModel& model, const robot::RobotState& state,
                               const std::array<bool, 2>& in_contact) {

@@ -9,9 +9,6 @@
 
 namespace poise {
 
-/// N·m: of what the file allows and what the motor gives at its peak current, the smaller.
-double TorqueLimit(const robot::RobotModel& model, size_t joint);
-
 /// N·m, by joint, unsigned: holds the robot at rest on the feet in contact, by the contact wrenches
 /// of least norm (RestWrenches).
 Eigen::VectorXd HoldingTorque(const robot::RobotModel& model, const robot::RobotState& state,

@@ -125,7 +125,7 @@ Strain StrainOnOneFoot(const RobotModel& model, const Anatomy& anatomy, const Fo
   Strain strain{-1, 0};
   for (const Leg& leg : anatomy.leg) {
     for (const int j : leg.joints) {
-      const double share = (*torque)[j] / TorqueLimit(model, static_cast<size_t>(j));
+      const double share = (*torque)[j] / robot::PeakTorque(model, static_cast<size_t>(j));
       if (share > strain.share) strain = {j, share};
     }
   }
