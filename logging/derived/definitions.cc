@@ -7,6 +7,7 @@
 #include "components/balance/contact_conditions.h"
 #include "components/balance/convex_polygon.h"
 #include "components/messages/conversions.h"
+#include "poise/drive_feedback_t.hpp"
 
 namespace poise::logging {
 namespace {
@@ -14,7 +15,6 @@ namespace {
 constexpr double kLightShare = 0.01;  // of the weight
 // A reading beyond this many standard deviations of its noise is a load.
 constexpr double kNoiseDeviations = 5;
-constexpr int8_t kSensorOk = 0;  // drive_feedback_t.SENSOR_OK
 
 Eigen::Quaterniond Rotation(const double (&q)[4]) {
   return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
@@ -92,7 +92,7 @@ std::optional<Wrench> KnownWrench(const robot::RobotModel& robot, const TickView
   }
   const robot_sensors_t* sensors = tick.sensors;
   if (sensors == nullptr || !robot.feet()[foot].force_sensor ||
-      sensors->foot_sensor[foot] != kSensorOk) {
+      sensors->foot_sensor[foot] != drive_feedback_t::SENSOR_OK) {
     return {};
   }
   return GetWrench(sensors->foot_wrench[foot]);

@@ -12,6 +12,7 @@
 #include "derived/message_traits.hpp"
 #include "fmt/format.h"
 #include "logging/derived/derived_reader.h"
+#include "logging/derived/told.h"
 #include "poise/message_traits.hpp"
 
 namespace poise::logging {
@@ -159,7 +160,7 @@ class ColumnSource {
       *index = lane.index;
       *type = lane.type;
       *tick = *at;
-      *data = event.data;
+      *data = WithoutUntold(*lane.type, event.data, &told_);
       return true;
     }
     return false;
@@ -198,6 +199,7 @@ class ColumnSource {
   DerivedReader events_;
   std::map<std::string, Lane, std::less<>> lanes_;
   std::vector<std::string> order_;
+  std::vector<uint8_t> told_;  // the last message, where some of it is left out
 };
 
 /// By ascending tick.

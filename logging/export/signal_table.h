@@ -21,7 +21,7 @@ struct SignalColumn {
   std::string field;  ///< path in the message, e.g. "foot_wrench[1].force[2]"
   bool integer = false;
   std::vector<double>
-      values;  ///< in the unit of the field's .lcm comment; NaN where the log says so
+      values;  ///< in the unit of the field's .lcm comment; NaN: none is told (WithoutUntold)
 };
 
 /// One channel: `ticks` ascending, each column of the same length.

@@ -391,37 +391,6 @@ test('a page is live when it shows what is, and else says how far it is behind',
   assert.match(liveText(feed)[1], /ended/);
 });
 
-test('what is not measured is no number', async () => {
-  const run = makeRun('7.2', {'robot_sensors_t.foot_sensor[0]': 1, 'drive_feedback_t.foot_sensor[0]': 2,
-    'joint_command_t.foot_wrench[0].force[2]': -236, 'joint_command_t.in_contact[1]': 1});
-  const first = async (name) => (await valuesOf(run, name))[0];
-  for (const name of ['ROBOT_SENSORS.foot_wrench[0].force[2]', 'DRIVE_FEEDBACK.foot_wrench[0].moment[1]', 'JOINT_COMMAND.margins[0].roll', 'ESTIMATOR_STATUS.covariance[0]', 'PLANNER_STATUS.step_time']) {
-    if (name.includes('margins') && !run.signals.has(name)) continue;
-    assert.ok(Number.isNaN(await first(name)), name);
-  }
-  assert.equal(Math.abs(await first('ROBOT_SENSORS.foot_wrench[1].force[2]')), 0);
-  assert.equal(await first('JOINT_COMMAND.foot_wrench[0].force[2]'), -236);
-  assert.equal(quantity(await first('ROBOT_SENSORS.foot_wrench[0].force[2]'), 'N', 3, true), '–');
-  // As it grows, too.
-  const live = makeRun('', {}, 0, {keep: 10});
-  live.appendTicks(2, {'ROBOT_SENSORS.foot_sensor[0]': new Float64Array([0, 1]), 'ROBOT_SENSORS.foot_wrench[0].force[2]': new Float32Array([-5, 0])});
-  assert.deepEqual(await valuesOf(live, 'ROBOT_SENSORS.foot_wrench[0].force[2]'), [-5, NaN]);
-});
-
-test('what a controller that distributes nothing does not tell is no number', async () => {
-  const first = async (run, name) => (await valuesOf(run, name))[0];
-  const names = ['JOINT_COMMAND.eta', 'JOINT_COMMAND.eta_optimal', 'JOINT_COMMAND.eta_min', 'JOINT_COMMAND.eta_max',
-    'JOINT_COMMAND.foot_wrench[0].force[2]', 'JOINT_COMMAND.foot_wrench[1].force[2]'];
-  const silent = makeRun('');
-  for (const name of names) assert.ok(Number.isNaN(await first(silent, name)), name);
-  // On the left foot alone, and where no ratio is feasible.
-  const left = makeRun('', {'joint_command_t.in_contact[1]': 1, 'joint_command_t.eta_feasible': 1, 'joint_command_t.foot_wrench[1].force[2]': -98});
-  for (const name of names.slice(0, 4)) assert.equal(await first(left, name), 0, name);
-  assert.equal(Math.abs(await first(left, 'JOINT_COMMAND.foot_wrench[0].force[2]')), 0);
-  assert.equal(await first(left, 'JOINT_COMMAND.foot_wrench[1].force[2]'), -98);
-  assert.equal(await first(makeRun('', {'joint_command_t.eta_max': 1}), 'JOINT_COMMAND.eta_max'), 1);
-});
-
 test('which torques are drawn is told', () => {
   const panelOfLeg = (run) => figuresFor(run).find(({title}) => title === 'Torques of the right leg, of their limits');
   for (const [gone, words] of [[[], /true torque/], [['ground_truth_t'], /as the bridge ordered it/],

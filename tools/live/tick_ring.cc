@@ -9,6 +9,7 @@
 #include "components/framework/run.h"
 #include "components/robot_files/robot_files.h"
 #include "derived/message_traits.hpp"
+#include "logging/derived/told.h"
 #include "logging/export/signal_table.h"
 #include "tools/live/field_selection.h"
 
@@ -174,6 +175,7 @@ void TickRing::TakeComplete() {
 }
 
 void TickRing::Fill(size_t lane, std::span<const uint8_t> data, int64_t tick) {
+  data = logging::WithoutUntold(*lanes_[lane].type, data, &told_);
   const size_t slot = Slot(tick);
   Filler filler(places_[lane], integer_values_.data() + slot * integers_,
                 real_values_.data() + slot * reals_);

@@ -87,6 +87,7 @@ class TickRing {
   int dense_ = 0;  // channels with a message each tick
   std::vector<double> integer_values_;
   std::vector<float> real_values_;
+  std::vector<uint8_t> told_;       // a message, where some of it is left out
   std::vector<int> arrived_;        // by slot
   std::vector<int64_t> last_tick_;  // by channel
   int64_t start_ = 0;

@@ -1,6 +1,5 @@
 #include "tools/robot/standing_loads.h"
 
-
 #include "components/robot/dynamics.h"
 #include "components/robot/posture.h"
 #include "sim/start_posture.h"

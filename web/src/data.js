@@ -30,29 +30,6 @@ export function describeField(messages, type, path, names = {}) {
   return {...result, label: labels.join('.')};
 }
 
-/**
- * Fields that hold a zero where there is nothing to tell: [pattern of type.field, fields of the message that tell ($1: a list's
- * index), whether the value of one of them says that there is something].
- */
-const TOLD = [
-  [/^(?:robot_sensors_t|drive_feedback_t)\.foot_wrench\[(\d+)\]\..*/, ['foot_sensor[$1]'], (sensor) => sensor === 0],
-  [/^joint_command_t\.margins\[(\d+)\]\..*/, ['in_contact[$1]'], (contact) => contact > 0],
-  // A controller that distributes nothing between the feet tells of no foot, and its ratio has no bound.
-  [/^joint_command_t\.foot_wrench\[\d+\]\..*/, ['in_contact[0]', 'in_contact[1]', 'conditions_met[0]', 'conditions_met[1]'],
-    (foot) => foot > 0],
-  [/^joint_command_t\.eta(?:_optimal|_min|_max)?$/, ['eta_feasible', 'eta_max'], (told) => told > 0],
-  [/^estimator_status_t\.covariance\[\d+\]/, ['has_covariance'], (has) => has > 0],
-  [/^planner_status_t\.step_(?:position\[\d\]|time)/, ['step_needed'], (needed) => needed > 0],
-  [/^bus_status_t\.((?:temperature|voltage)\[\d+\])/, ['$1'], (reported) => reported !== 0],
-];
-
-/** {names, says} of the signals that tell whether this one's value is one; undefined: it always is. */
-function tellerOf(channel, field) {
-  const path = `${channel.type}.${field}`;
-  const [pattern, tellers, says] = TOLD.find(([p]) => p.test(path)) ?? [];
-  return pattern && {names: tellers.map((teller) => `${channel.name}.${path.replace(pattern, teller)}`), says};
-}
-
 /** One scalar by row; NaN where its channel has no message. `values` is there after load(). */
 export class Signal {
   #column = null;
@@ -71,7 +48,6 @@ export class Signal {
     Object.assign(this, description);
     /** As people read it: joints and feet by their names. */
     this.title = `${channel.name}.${this.label}`;
-    this.teller = tellerOf(channel, spec.field);
     if (channel.run.meta.live) this.#start();
   }
 
@@ -83,26 +59,8 @@ export class Signal {
     const {channel, spec} = this;
     const bounds = spec.least ? [spec.least, spec.largest].map((bound) => channel.read(bound, true)) : [];
     const [values, least, largest] = await Promise.all([channel.read(spec, this.integer), ...bounds]);
-    const tellers = (this.teller?.names ?? []).map((name) => channel.run.signals.get(name)).filter(Boolean);
-    await Promise.all(tellers.filter((teller) => teller !== this).map((teller) => teller.load()));
-    const told = tellers.map((teller) => teller === this ? values.slice() : teller.values);
-    for (const column of [values, least, largest].filter(Boolean)) this.#leaveOut(column, told);
     Object.assign(this, {least, largest});
     this.#column = new Column(values);
-  }
-
-  /** NaN for what is no value. */
-  #leaveOut(values, told) {
-    for (let i = 0; told.length > 0 && i < values.length; ++i) if (!told.some((by) => this.teller.says(by[i]))) values[i] = NaN;
-  }
-
-  /** This signal's column of `values` by name, which append and fill take. */
-  columnOf(values) {
-    const own = values[this.name], told = (this.teller?.names ?? []).map((name) => values[name]).filter(Boolean);
-    if (!own || told.length === 0) return own;
-    const known = own.slice();
-    this.#leaveOut(known, told.map((by) => by.slice()));
-    return known;
   }
 
   /** Rows at the beginning that there are no values of yet. */
@@ -246,7 +204,7 @@ export class Run extends EventTarget {
   appendTicks(count, values) {
     const none = new Float32Array(count).fill(NaN);
     const dropped = Math.max(0, this.numRows + count - this.keep);
-    for (const signal of this.signals.values()) signal.append(signal.columnOf(values) ?? none, dropped);
+    for (const signal of this.signals.values()) signal.append(values[signal.name] ?? none, dropped);
     this.firstTick += dropped;
     this.numRows += count - dropped;
     this.dispatchEvent(new Event('append'));
@@ -263,7 +221,7 @@ export class Run extends EventTarget {
     for (const {first, count, values} of kept) {
       const skipped = Math.max(0, least - first), row = first + skipped - this.firstTick;
       for (const signal of this.signals.values()) {
-        const column = signal.columnOf(values);
+        const column = values[signal.name];
         if (column) signal.fill(row, column.subarray(skipped, skipped + Math.max(0, this.numRows - row)));
       }
     }

@@ -5,8 +5,10 @@
 
 #include <cmath>
 #include <limits>
+#include <string_view>
 
 #include "logging/derived/tick_messages.h"
+#include "poise/drive_feedback_t.hpp"
 #include "poise/emergency_stop_t.hpp"
 #include "tests/logging/log_test_support.h"
 #include "tests/logging/record_fixture.h"
@@ -21,7 +23,11 @@ class SignalTableTest : public testing::Test {
   template <class T>
   static T Message(int64_t tick) {
     T message{};
-    MessageTraits<T>::Resize(message, std::vector<int32_t>{12, 2});
+    std::vector<int32_t> counts;
+    for (const char* name : MessageTraits<T>::kCountNames) {
+      counts.push_back(std::string_view(name) == "num_feet" ? 2 : 12);
+    }
+    MessageTraits<T>::Resize(message, counts);
     SetHeader(tick, &message);
     return message;
   }
@@ -91,6 +97,43 @@ TEST_F(SignalTableTest, ShowsNumbersThatAreNotFinite) {
   ASSERT_EQ(channels[0].ticks.size(), 2u);
   EXPECT_TRUE(std::isnan(Find(channels[0], "torque[5]")->values[0]));
   EXPECT_EQ(Find(channels[0], "torque[5]")->values[1], 0);
+}
+
+TEST_F(SignalTableTest, WhatAMessageDoesNotTellIsNoNumber) {
+  auto sensors = Message<robot_sensors_t>(0);
+  sensors.foot_sensor[0] = drive_feedback_t::SENSOR_ABSENT;
+  auto silent = Message<joint_command_t>(0), left = Message<joint_command_t>(1),
+       infeasible = Message<joint_command_t>(2);
+  left.in_contact[1] = left.conditions_met[1] = left.eta_feasible = 1;
+  left.foot_wrench[1].force[2] = -98;
+  infeasible.eta_max = 1;
+  auto needed = Message<planner_status_t>(1);
+  needed.step_needed = 1;
+  const auto channels =
+      Read({Event("ROBOT_SENSORS", sensors), Event("PLANNER_STATUS", Message<planner_status_t>(0)),
+            Event("JOINT_COMMAND", silent), Event("JOINT_COMMAND", left),
+            Event("JOINT_COMMAND", infeasible), Event("PLANNER_STATUS", needed),
+            Event("ESTIMATOR_STATUS", Message<estimator_status_t>(0))});
+  const auto values = [&](const std::string& name, const std::string& field) {
+    for (const ChannelColumns& channel : channels) {
+      if (channel.name == name) return Find(channel, field)->values;
+    }
+    return std::vector<double>{};
+  };
+  const auto none = testing::IsNan();
+  EXPECT_THAT(values("ROBOT_SENSORS", "foot_wrench[0].force[2]"), ElementsAre(none));
+  EXPECT_THAT(values("ROBOT_SENSORS", "foot_wrench[1].force[2]"), ElementsAre(0));
+  EXPECT_THAT(values("ESTIMATOR_STATUS", "covariance[0]"), ElementsAre(none));
+  EXPECT_THAT(values("PLANNER_STATUS", "step_time"), ElementsAre(none, 0));
+  EXPECT_THAT(values("PLANNER_STATUS", "step_position[2]"), ElementsAre(none, 0));
+  EXPECT_THAT(values("JOINT_COMMAND", "torque[3]"), ElementsAre(0, 0, 0));
+  // A foot in the air bears nothing, which is told, and has no margin.
+  EXPECT_THAT(values("JOINT_COMMAND", "foot_wrench[0].force[2]"), ElementsAre(none, 0, none));
+  EXPECT_THAT(values("JOINT_COMMAND", "foot_wrench[1].force[2]"), ElementsAre(none, -98, none));
+  EXPECT_THAT(values("JOINT_COMMAND", "margins[0].roll"), ElementsAre(none, none, none));
+  EXPECT_THAT(values("JOINT_COMMAND", "margins[1].roll"), ElementsAre(none, 0, none));
+  EXPECT_THAT(values("JOINT_COMMAND", "eta_optimal"), ElementsAre(none, 0, 0));
+  EXPECT_THAT(values("JOINT_COMMAND", "eta_max"), ElementsAre(none, 0, 1));
 }
 
 TEST_F(SignalTableTest, LeavesOutWhatIsOfAnotherRunOrOfNoChannel) {
