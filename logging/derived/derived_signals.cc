@@ -24,6 +24,8 @@ struct Inputs {
   const RunMessages& run;
   TickView before, now;  ///< nothing before a tick whose predecessor is missing
   const std::optional<Eigen::Vector3d>&first_com, &first_true_com;
+  double time;  ///< s, of the scenario
+  std::array<Footprint, 2>& prints;
 };
 
 /// Bits of message types, in TickView's order.
@@ -244,6 +246,24 @@ const std::vector<Definition>& Definitions() {
              in, [&](size_t f) { return std::optional(GetWrench(in.now.truth->foot_wrench[f])); },
              &derived::foot_t::load_true, &derived::foot_t::cop_true, nullptr, 0, out);
        }},
+      {{"foot.print_time", "foot.print_position", "foot.print_orientation"},
+       {kPlan | kState | kTruth, kPlan | kState | kPlanner},
+       [](const Inputs& in, signals_t* out) {
+         const bool soles = in.run.truth ? in.now.truth != nullptr : in.now.planner != nullptr;
+         for (size_t f = 0; f < out->foot.size(); ++f) {
+           if (soles) {
+             in.prints[f].Update(
+                 in.time, in.now.plan->in_contact[f] != 0, -in.now.state->foot_wrench[f].force[2],
+                 in.run.truth ? in.now.truth->foot_pose[f] : in.now.planner->foot_pose[f],
+                 in.robot.total_mass() * robot::kGravity);
+           }
+           if (!in.prints[f].last()) continue;
+           const auto& [since, sole] = *in.prints[f].last();
+           out->foot[f].print_time = since;
+           std::ranges::copy(sole.position, out->foot[f].print_position);
+           std::ranges::copy(sole.orientation, out->foot[f].print_orientation);
+         }
+       }},
       {{"foot.position_error"},
        {kPlan | kPlanner},
        [](const Inputs& in, signals_t* out) {
@@ -280,6 +300,8 @@ void VisitReals(F* field, const Visit& visit) {
 DerivedSignals::DerivedSignals(const RunSpec& spec, const robot::RobotModel& robot)
     : robot_(robot),
       run_id_(spec.run_id()),
+      lead_ticks_(spec.lead_ticks()),
+      period_(spec.tick_period()),
       counts_{robot.num_joints(), static_cast<int32_t>(robot.feet().size())} {
   bool fits = true;
   for (const Channel& channel : spec.graph().channel()) {
@@ -326,8 +348,10 @@ const signals_t& DerivedSignals::Next(TickMessages now) {
   if (now.planner && !first_com_) first_com_ = GetVector3(now.planner->com_position);
   if (now.truth && !first_true_com_) first_true_com_ = GetVector3(now.truth->com_position);
   const bool follows = before_.tick == now.tick - 1;
+  const double time = static_cast<double>(now.tick - lead_ticks_) * period_;
   const Inputs inputs{robot_,     run_,       follows ? before_.view() : TickView(),
-                      now.view(), first_com_, first_true_com_};
+                      now.view(), first_com_, first_true_com_,
+                      time,       prints_};
   uint32_t types = 0, bit = 1;
   now.view().VisitMessages([&](const auto* message) {
     if (message != nullptr) types |= bit;

@@ -2,6 +2,7 @@
 // MCAP and Python read these and compute none of their own.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string_view>
@@ -9,6 +10,7 @@
 
 #include "components/robot/robot_model.h"
 #include "logging/derived/definitions.h"
+#include "logging/derived/footprint.h"
 #include "logging/derived/tick_messages.h"
 
 namespace poise::logging {
@@ -31,12 +33,14 @@ class DerivedSignals {
  private:
   const robot::RobotModel& robot_;
   RunMessages run_;
-  int64_t run_id_;
+  int64_t run_id_, lead_ticks_;
+  double period_;       // s
   uint32_t types_ = 0;  // that the graph has
   bool any_ = false;
   std::vector<int32_t> counts_;
   TickMessages before_;
   std::optional<Eigen::Vector3d> first_com_, first_true_com_;
+  std::array<Footprint, 2> prints_;
   derived::signals_t signals_;
 };
 

@@ -215,6 +215,67 @@ TEST_F(DerivedSignalsTest, BoundsAreThreeDeviationsOfTheNorm) {
   EXPECT_NEAR(signals.Next(messages).base_velocity_bound, 9, 1e-12);  // 3 |(1, 2, 2)|
 }
 
+/// What a foot does in a tick.
+struct Tread {
+  bool in_contact;
+  double load;  ///< N
+  double x;     ///< m
+};
+/// Each footprint's first tick and its place, of ticks of 2 ms and a robot of 98 N.
+std::vector<std::pair<int, double>> PrintsOf(int ticks, Tread (*tread)(int tick)) {
+  Footprint foot;
+  std::vector<std::pair<int, double>> prints;
+  for (int t = 0; t < ticks; ++t) {
+    const Tread now = tread(t);
+    pose_t sole{};
+    sole.orientation[0] = 1;
+    sole.position[0] = now.x;
+    foot.Update(0.002 * t, now.in_contact, now.load, sole, 98);
+    if (!foot.last()) continue;
+    const int since = static_cast<int>(std::lround(foot.last()->since / 0.002));
+    if (prints.empty() || prints.back().first != since) prints.emplace_back(since, 0);
+    prints.back().second = foot.last()->sole.position[0];
+  }
+  return prints;
+}
+
+TEST(FootprintTest, IsWhereAFootStoodFirmlyFromWhenItCarried) {
+  // It stands, swings from 20 on, touches with a bounce from 100 on, and lies from 110 on.
+  const auto prints = PrintsOf(130, [](int t) -> Tread {
+    if (t < 20) return {true, 50, 0.1};
+    if (t < 100) return {false, 3, 0.1 + 0.0025 * (t - 20)};
+    if (t < 102) return {true, 0, 0.3};  // in the plan's contact, and not on the ground yet
+    if (t < 104) return {true, 10, 0.31};
+    if (t < 110) return {false, 0, 0.32};
+    return {true, 50, 0.32};
+  });
+  EXPECT_THAT(prints, testing::ElementsAre(testing::Pair(0, 0.1), testing::Pair(102, 0.32)));
+}
+
+TEST(FootprintTest, AFootThatSlidesLeavesSeveralWhateverThePlanSays) {
+  const auto prints = PrintsOf(100, [](int t) -> Tread {
+    return {t >= 10, 50, t < 50 ? 0 : 0.0011 * (t - 50)};
+  });
+  ASSERT_EQ(prints.size(), 3u);
+  EXPECT_EQ(prints[0].first, 0);
+  EXPECT_EQ(prints[1].first, 69);
+  EXPECT_EQ(prints[2].first, 88);
+  EXPECT_GT(prints[1].second, 0.02);
+}
+
+TEST_F(DerivedSignalsTest, FootprintsAreTheTrueSolesWhereTheRunHasThem) {
+  const double weight = Weight();
+  for (size_t t = 0; t < kTicks; ++t) {
+    for (size_t foot = 0; foot < 2; ++foot) {
+      state_[t].foot_wrench[foot].force[2] = t < 30 ? 0 : -weight / 2;
+      truth_[t].foot_pose[foot].position[0] = 0.25;
+    }
+  }
+  EXPECT_TRUE(std::isnan(Value("foot[1].print_time", 29)));
+  EXPECT_NEAR(Value("foot[1].print_time", 90), 0.060, 1e-12);
+  EXPECT_EQ(Value("foot[1].print_position[0]", 90), 0.25);
+}
+
 TEST(DerivedDefinitions, TheFewestStepsThatCatch) {
   planner_status_t planner{};
   steps::footsteps_t footsteps{};

@@ -3,69 +3,41 @@ import {test} from 'node:test';
 import {apart, Footprints, plannedAt, regionsAt} from '../../web/src/footsteps.js';
 import {makeRun} from './fixture.mjs';
 
-const ORIENTATION = [1, 0, 0, 0];
-
-/** A live run of so many ticks; `tick(t)`: [contact, load, x] of the right foot. The left one stands at y = 1 all the time. */
-function walked(ticks, tick, keep = 1000) {
+/** A live run of so many ticks: the right foot's prints begin at ticks `begins`, a metre apart; the left one's at tick 5. */
+async function walked(ticks, begins, keep = 1000) {
   const run = makeRun('', {}, 0, {keep});
   const footprints = new Footprints(run);
-  const add = (from, to) => {
-    const values = {};
-    const put = (name, f) => { values[name] = Float32Array.from({length: to - from}, (_, i) => f(from + i)); };
+  await footprints.load();
+  const print = (foot, t) => (foot === 1 ? [5] : begins).filter((begin) => begin <= t);
+  for (let from = 0; from < ticks; from += 7) {
+    const count = Math.min(7, ticks - from), values = {};
+    const put = (name, f) => { values[`DERIVED.${name}`] = Float32Array.from({length: count}, (_, i) => f(from + i)); };
     for (const foot of [0, 1]) {
-      put(`SUPPORT_PLAN.in_contact[${foot}]`, (t) => (foot === 1 ? 1 : tick(t)[0]));
-      put(`ROBOT_STATE.foot_wrench[${foot}].force[2]`, (t) => -(foot === 1 ? 60 : tick(t)[1]));
-      [0, 1, 2].forEach((axis) => put(`GROUND_TRUTH.foot_pose[${foot}].position[${axis}]`,
-        (t) => [foot === 1 ? 0 : tick(t)[2], foot, 0][axis]));
-      ORIENTATION.forEach((q, i) => put(`GROUND_TRUTH.foot_pose[${foot}].orientation[${i}]`, () => q));
+      put(`foot[${foot}].print_time`, (t) => (print(foot, t).at(-1) ?? NaN) * run.period);
+      put(`foot[${foot}].print_position[0]`, (t) => (print(foot, t).length || NaN) + (t % 2) * 0.001);
     }
-    run.appendTicks(to - from, values);
+    run.appendTicks(count, values);
     footprints.update();
-  };
-  return footprints.load().then(() => {
-    for (let t = 0; t < ticks; t += 7) add(t, Math.min(t + 7, ticks));
-    return {run, footprints};
-  });
+  }
+  return {run, footprints};
 }
+const begun = ({run, footprints}) => footprints.list.map(({foot, from}) => [foot, Math.round(from / run.period)]);
 
-// The robot weighs 98 N: the foot stands from tick 0, swings from 20, touches with a bounce from 100 on, and lies from 110 on.
-const swing = (t) => {
-  if (t < 20) return [1, 50, 0.1];
-  if (t < 100) return [0, 3, 0.1 + 0.0025 * (t - 20)];
-  if (t < 102) return [1, 0, 0.3];  // in the plan's contact, and not on the ground yet
-  if (t < 104) return [1, 10, 0.31];
-  if (t < 110) return [0, 0, 0.32];
-  return [1, 50, 0.32];
-};
-
-// It carries before the plan says so, and slides later.
-const slide = (t) => [t < 10 ? 0 : 1, 50, t < 50 ? 0 : 0.0011 * (t - 50)];
-
-test('a footprint is where a foot stood firmly, from when it carried to when it left', async () => {
-  const {run, footprints} = await walked(130, swing);
-  const right = footprints.list.filter((print) => print.foot === 0);
-  assert.equal(right.length, 2);
-  assert.deepEqual(right.map((print) => Math.round(print.from / run.period)), [0, 102]);
-  assert.deepEqual(right.map((print) => (print.to === undefined ? undefined : Math.round(print.to / run.period))), [19, undefined]);
-  right.forEach((print, i) => assert.ok(Math.abs(print.pose.position[0] - [0.1, 0.32][i]) < 1e-6));
-  assert.equal(footprints.list.filter((print) => print.foot === 1).length, 1);
+test('footprints are those that the run tells, in order, each as it was last', async () => {
+  const all = await walked(130, [0, 102]);
+  assert.deepEqual(begun(all), [[0, 0], [1, 5], [0, 102]]);
+  const {run, footprints} = all;
+  assert.deepEqual(footprints.list.map(({pose}) => Math.round(1000 * pose.position[0])), [1001, 1001, 2001]);
   assert.deepEqual(footprints.until(30 * run.period, 10).map((print) => print.foot), [0, 1]);
-  assert.deepEqual(footprints.until(1, 1).map((print) => print.from), [102 * run.period]);
-});
-
-test('a foot stands as soon as it carries, whatever the plan says, and leaves more footprints where it slides', async () => {
-  const {run, footprints} = await walked(100, slide);
-  const right = footprints.list.filter((print) => print.foot === 0);
-  assert.deepEqual(right.map((print) => Math.round(print.from / run.period)), [0, 69, 88]);
-  right.slice(1).forEach((print) => assert.ok(print.pose.position[0] > 0.02));
+  assert.deepEqual(footprints.until(102 * run.period, 1).map((print) => print.foot), [0]);
 });
 
 test('a live run that lets go of ticks keeps its footprints, and one that starts anew loses them', async () => {
-  const {run, footprints} = await walked(130, swing, 10);
-  assert.equal(footprints.list.length, 3);
-  run.restart();
-  footprints.update();
-  assert.equal(footprints.list.length, 0);
+  const all = await walked(130, [0, 102], 10);
+  assert.equal(all.footprints.list.length, 3);
+  all.run.restart();
+  all.footprints.update();
+  assert.equal(all.footprints.list.length, 0);
 });
 
 test('regions and planned footholds are what the message says', async () => {

@@ -1,42 +1,29 @@
 // Where the feet stood, where they are to come down, and from where steps bring the COM to rest: of a run's signals alone.
-import {Samples, pose, vector} from './samples.js';
+import {DERIVED} from './figures.js';
+import {Samples, vector} from './samples.js';
 
-const BOUNCE = 0.1;  // s without a load that leave a footprint what it is
-const SLID = 0.02;   // m, from above, that make it another one
-const ROLLED = 0.01;  // m that its centre is higher than when it first stood firmly: it rolls off
 const COVERED = 0.04;  // m between two prints of a foot of which one would hide the other
-const LIGHT = 0.05, FIRM = 0.25;  // of the weight, of a foot that stands where it is planned to; of one that stands firmly
-const GRAVITY = 9.80665;  // m/s²
 export const FOOTSTEPS = 'steps.footsteps_t';
 export const PLANNED = 3;  // footholds, at the most
 const CORNERS = 16;        // of a region, at the most
 export const REGIONS = 3;  // for 0, 1 and 2 steps
 
-/**
- * The footprints of a run, in order: {foot, from, to, pose}. A foot stands while it carries something: 5 % of the weight where the plan
- * has it in contact, else a quarter; `to` is undefined while it still does. `pose` is its sole's in the last of these ticks in which
- * it carried a quarter and lay flat (if in none: carried anything): before that it may bounce, afterwards roll off. One that slides
- * leaves several.
- */
+/** The footprints of a run, in order: {foot, from, pose}, as lcmtypes/derived/foot_t.lcm says; `from`: s. */
 export class Footprints {
   #samples = new Samples();
   #next = 0;     // tick
-  #open = [];    // by foot
+  #last = [];    // by foot
   #restarts = 0;
 
   constructor(run) {
     this.run = run;
     this.list = [];
-    this.weight = GRAVITY * run.robot.mass;
   }
 
   async load() {
-    const {run} = this;
-    const truth = run.find('ground_truth_t', 'foot_pose[0].position[0]');
-    await this.#samples.load(run, Object.assign({}, ...run.robot.feet.map((_, f) => ({
-      ...pose(`sole${f}`, truth ? 'ground_truth_t' : 'planner_status_t', `foot_pose[${f}]`),
-      [`contact${f}`]: ['support_plan_t', `in_contact[${f}]`],
-      [`load${f}`]: ['robot_state_t', `foot_wrench[${f}].force[2]`],
+    await this.#samples.load(this.run, Object.assign({}, ...this.run.robot.feet.map((_, f) => ({
+      [`from${f}`]: [DERIVED, `foot[${f}].print_time`], ...vector(`position${f}`, DERIVED, `foot[${f}].print_position`),
+      ...vector(`orientation${f}`, DERIVED, `foot[${f}].print_orientation`, 4),
     }))));
     this.update();
   }
@@ -47,7 +34,7 @@ export class Footprints {
     if ((run.restarts ?? 0) !== this.#restarts) {
       this.#restarts = run.restarts;
       this.list = [];
-      this.#open = [];
+      this.#last = [];
       this.#next = 0;
     }
     let row = Math.max(0, run.rowOfTick(this.#next));
@@ -57,41 +44,19 @@ export class Footprints {
   }
 
   #take(foot, row) {
-    const contact = this.#samples.at(`contact${foot}`, row), load = -this.#samples.at(`load${foot}`, row);
-    if (Number.isNaN(contact + load)) return;
-    const time = this.run.timeAt(row);
-    let open = this.#open[foot];
-    const firm = load > FIRM * this.weight;
-    if (!firm && !(contact > 0 && load > LIGHT * this.weight)) {
-      if (open && time - open.loaded > BOUNCE) {
-        open.to = open.loaded;
-        this.#open[foot] = undefined;
-      }
-      return;
+    const from = this.#samples.at(`from${foot}`, row);
+    if (Number.isNaN(from)) return;
+    if (this.#last[foot]?.from !== from) {
+      this.list.push(this.#last[foot] = {foot, from});
+      this.list.sort((a, b) => a.from - b.from);  // the first row's stand since before it
     }
-    const before = open?.loaded;  // until when it has stood there, should it stand elsewhere now
-    if (open) open.loaded = time;
-    if (open?.firm && !firm) return;
-    const stands = this.#samples.pose(`sole${foot}`, row);
-    if (![...stands.position, ...stands.orientation].every(Number.isFinite)) return;
-    if (open?.firm && Math.hypot(...[0, 1].map((i) => stands.position[i] - open.first[i])) > SLID) {
-      open.to = before;
-      open = undefined;
-    }
-    if (!open) {
-      open = {foot, from: time, to: undefined};
-      this.list.push(open);
-      this.#open[foot] = open;
-    }
-    if (open.firm && stands.position[2] > open.first[2] + ROLLED) return;
-    if (firm && !open.firm) open.first = stands.position;
-    Object.assign(open, {pose: stands, firm, loaded: time});
+    this.#last[foot].pose = {position: this.#samples.vector(`position${foot}`, row), orientation: this.#samples.vector(`orientation${foot}`, row, 4)};
   }
 
   /** Of those that had begun at a time the last `count`. */
   until(time, count) {
     let end = this.list.length;
-    while (end > 0 && this.list[end - 1].from > time) --end;
+    while (end > 0 && this.list[end - 1].from > time + this.run.period / 2) --end;
     return this.list.slice(Math.max(0, end - count), end);
   }
 }
