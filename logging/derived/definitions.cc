@@ -188,6 +188,19 @@ EstimatorError BaseError(const robot_state_t& estimate, const ground_truth_t& tr
   return error;
 }
 
+Eigen::Matrix<double, 9, 1> BaseErrorVector(const robot_state_t& estimate,
+                                            const ground_truth_t& truth) {
+  Eigen::Quaterniond turn =
+      Rotation(estimate.base_orientation) * Rotation(truth.base_orientation).conjugate();
+  if (turn.w() < 0) turn.coeffs() = -turn.coeffs();
+  const Eigen::AngleAxisd rotation(turn);
+  Eigen::Matrix<double, 9, 1> error;
+  error << rotation.angle() * rotation.axis(),
+      GetVector3(estimate.base_linear_velocity) - GetVector3(truth.base_linear_velocity),
+      GetVector3(estimate.base_position) - GetVector3(truth.base_position);
+  return error;
+}
+
 std::optional<int> StepsThatCatch(const planner_status_t& planner,
                                   const steps::footsteps_t& footsteps) {
   if (footsteps.stance < 0) return {};

@@ -88,6 +88,11 @@ struct EstimatorError {
 };
 EstimatorError BaseError(const robot_state_t& estimate, const ground_truth_t& truth);
 
+/// BaseError as ESTIMATOR_STATUS orders it: orientation (rotation vector of estimate times truth
+/// inverted, rad), linear velocity (m/s), position (m), world axes.
+Eigen::Matrix<double, 9, 1> BaseErrorVector(const robot_state_t& estimate,
+                                            const ground_truth_t& truth);
+
 /// The fewest steps, 0 to 2, in whose region (steps::footsteps_t) the capture point is; 3: in none
 /// of them.
 std::optional<int> StepsThatCatch(const planner_status_t& planner,

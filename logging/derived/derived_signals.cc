@@ -66,7 +66,7 @@ std::optional<Eigen::Vector2d> SoleCop(const robot::RobotModel& robot,
 }
 
 /// Three standard deviations of the norm of those errors of the estimate.
-double Bound(const estimator_status_t& status, std::initializer_list<int> errors) {
+double ThreeDeviations(const estimator_status_t& status, std::initializer_list<int> errors) {
   double sum = 0;
   for (const int i : errors) sum += status.covariance[9 * i - i * (i - 1) / 2];
   return 3 * std::sqrt(sum);
@@ -197,9 +197,9 @@ const std::vector<Definition>& Definitions() {
        [](const Inputs& in, signals_t* out) {
          const estimator_status_t& status = *in.now.estimator;
          if (status.has_covariance == 0) return;
-         out->base_position_bound = Bound(status, {6, 7, 8});
-         out->base_velocity_bound = Bound(status, {3, 4, 5});
-         out->base_tilt_bound = Bound(status, {0, 1});
+         out->base_position_bound = ThreeDeviations(status, {6, 7, 8});
+         out->base_velocity_bound = ThreeDeviations(status, {3, 4, 5});
+         out->base_tilt_bound = ThreeDeviations(status, {0, 1});
        }},
       {{"push_magnitude"},
        {kPush},

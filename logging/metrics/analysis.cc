@@ -15,10 +15,6 @@ namespace {
 constexpr double kWrenchTolerance = 1e-6;  // N, N·m
 constexpr double kCopTolerance = 1e-9;     // m
 
-Eigen::Quaterniond Rotation(const double (&q)[4]) {
-  return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
-}
-
 bool InContact(const support_plan_t& plan, int foot) {
   return plan.in_contact[static_cast<size_t>(foot)] != 0;
 }
@@ -191,19 +187,6 @@ std::optional<bool> Violated(const RunRecord& run, int64_t tick) {
     if (!(std::abs(balance->cop[axis]) <= balance->cop_limit[axis] + kCopTolerance)) return true;
   }
   return false;
-}
-
-Eigen::Matrix<double, 9, 1> BaseErrorVector(const robot_state_t& estimate,
-                                            const ground_truth_t& truth) {
-  Eigen::Quaterniond turn =
-      Rotation(estimate.base_orientation) * Rotation(truth.base_orientation).conjugate();
-  if (turn.w() < 0) turn.coeffs() = -turn.coeffs();
-  const Eigen::AngleAxisd rotation(turn);
-  Eigen::Matrix<double, 9, 1> error;
-  error << rotation.angle() * rotation.axis(),
-      GetVector3(estimate.base_linear_velocity) - GetVector3(truth.base_linear_velocity),
-      GetVector3(estimate.base_position) - GetVector3(truth.base_position);
-  return error;
 }
 
 Answer Nees(const robot_state_t& estimate, const estimator_status_t& status,

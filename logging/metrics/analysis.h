@@ -59,11 +59,6 @@ balance::ConvexPolygon AcceptableRegion(const balance_torque_t& balance);
 /// there is BALANCE_TORQUE. Empty where the command tells of no foot.
 std::optional<bool> Violated(const RunRecord& run, int64_t tick);
 
-/// BaseError as ESTIMATOR_STATUS orders it: orientation (rotation vector of estimate times truth
-/// inverted, rad), linear velocity (m/s), position (m), world axes.
-Eigen::Matrix<double, 9, 1> BaseErrorVector(const robot_state_t& estimate,
-                                            const ground_truth_t& truth);
-
 /// Which errors a normalised estimation error squared (NEES) counts.
 enum class NeesPart {
   kAll,         ///< 9 degrees of freedom
