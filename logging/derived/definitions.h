@@ -52,7 +52,7 @@ struct PlacedCop {
   Eigen::Vector2d cop;  ///< m
   Eigen::Isometry3d frame;
 };
-/// The same of what the feet read at `now`, of the feet in contact: as planned, in a run without
+/// m, of what the feet read at `now`, of the feet in contact: as planned, in a run without
 /// plan those that read a load. A reading shows the command of the tick before, so frame O and the
 /// soles' poses are those of `before`: as estimated, in a run without plan and balancing the true
 /// ones.

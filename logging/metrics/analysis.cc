@@ -83,7 +83,7 @@ std::optional<BalancingIntervals> Balancing(const RunRecord& run) {
 
 namespace {
 
-// Of a tick that which is asked for alone: a long run's messages are read from the disk.
+// Views hold what is asked for alone: a long run's messages are read from the disk.
 
 TickView FeetOf(const RunRecord& run, int64_t tick) {
   return {.sensors = run.sensors.at(tick), .state = run.state.at(tick)};

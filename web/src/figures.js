@@ -2,7 +2,7 @@
 import {LIMITS_SHOWN} from './units.js';
 
 const series = (label, role, type, field) => ({label, role, type, field});
-/** Of what follows from a run's messages: lcmtypes/derived/. */
+/** The message of what follows from others: lcmtypes/derived/. */
 export const DERIVED = 'derived.signals_t';
 const derived = (label, role, field) => series(label, role, DERIVED, field);
 

@@ -22,8 +22,8 @@ export class Footprints {
 
   async load() {
     await this.#samples.load(this.run, Object.assign({}, ...this.run.robot.feet.map((_, f) => ({
-      [`from${f}`]: [DERIVED, `foot[${f}].print_time`], ...vector(`position${f}`, DERIVED, `foot[${f}].print_position`),
-      ...vector(`orientation${f}`, DERIVED, `foot[${f}].print_orientation`, 4),
+      [`from${f}`]: [DERIVED, `foot[${f}].print_time`], ...vector(`print${f}.position`, DERIVED, `foot[${f}].print_position`),
+      ...vector(`print${f}.orientation`, DERIVED, `foot[${f}].print_orientation`, 4),
     }))));
     this.update();
   }
@@ -50,7 +50,7 @@ export class Footprints {
       this.list.push(this.#last[foot] = {foot, from});
       this.list.sort((a, b) => a.from - b.from);  // the first row's stand since before it
     }
-    this.#last[foot].pose = {position: this.#samples.vector(`position${foot}`, row), orientation: this.#samples.vector(`orientation${foot}`, row, 4)};
+    this.#last[foot].pose = this.#samples.pose(`print${foot}`, row);
   }
 
   /** Of those that had begun at a time the last `count`. */
