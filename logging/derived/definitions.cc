@@ -138,8 +138,9 @@ std::optional<Eigen::Vector4d> ContactLimits(const robot::RobotModel& robot, con
   const auto ratios = ContactRatios(*wrench, LightLoad(robot));
   if (!ratios) return {};
   const contact_margins_t& m = tick.command->margins[foot];
-  Eigen::Vector4d limits =
-      *ratios + Eigen::Vector4d(m.friction, m.yaw, m.roll, m.pitch) / std::abs((*wrench)(2));
+  const Eigen::Vector4d left(m.friction, m.yaw, m.roll, m.pitch);
+  if (left.isZero(0)) return {};  // a controller that computes none
+  Eigen::Vector4d limits = *ratios + left / std::abs((*wrench)(2));
   if (m.roll == m.pitch)
     limits.tail<2>().setConstant(std::nan(""));  // the nearest edge's of a sole
   // What is left and what is taken are rounded differently in each tick, and the limit is one.
