@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <boost/crc.hpp>
-#include <charconv>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "components/framework/bus/packet_filter.h"
 #include "fmt/format.h"
@@ -56,9 +56,7 @@ std::vector<ChannelBits> BitsOfLog(const std::string& path) {
   }
   LogEvent event;
   while (reader.Next(&event)) {
-    const auto channel =
-        std::find_if(channels.begin(), channels.end(),
-                     [&](const Accumulator& each) { return each.name == event.channel; });
+    const auto channel = std::ranges::find(channels, event.channel, &Accumulator::name);
     if (channel != channels.end()) channel->Add(event.data, path);
   }
   std::vector<ChannelBits> bits;
@@ -76,8 +74,7 @@ std::optional<BitsDifference> FirstDifference(const std::vector<ChannelBits>& re
     first = {static_cast<int64_t>(tick), channel, what};
   };
   const auto find = [](const std::vector<ChannelBits>& all, const std::string& name) {
-    const auto found = std::find_if(all.begin(), all.end(),
-                                    [&](const ChannelBits& each) { return each.name == name; });
+    const auto found = std::ranges::find(all, name, &ChannelBits::name);
     return found == all.end() ? nullptr : &*found;
   };
   for (const ChannelBits& channel : seen) {
@@ -88,10 +85,7 @@ std::optional<BitsDifference> FirstDifference(const std::vector<ChannelBits>& re
     }
     const size_t both = std::min(record->by_tick.size(), channel.by_tick.size());
     const auto differs = static_cast<size_t>(
-        std::mismatch(channel.by_tick.begin(), channel.by_tick.begin() + static_cast<long>(both),
-                      record->by_tick.begin())
-            .first -
-        channel.by_tick.begin());
+        std::ranges::mismatch(channel.by_tick, record->by_tick).in1 - channel.by_tick.begin());
     if (differs < both) {
       note(differs, channel.name, "its message differs");
     } else if (record->by_tick.size() != channel.by_tick.size()) {
@@ -110,9 +104,8 @@ std::optional<BitsDifference> FirstDifference(const std::vector<ChannelBits>& re
 nlohmann::ordered_json BitsJson(const std::vector<ChannelBits>& bits) {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (const ChannelBits& channel : bits) {
-    json.push_back({{"name", channel.name},
-                    {"ticks", channel.by_tick.size()},
-                    {"crc64", fmt::format("{:016x}", channel.crc64)}});
+    json.push_back(
+        fmt::format("{:016x} {} {}", channel.crc64, channel.by_tick.size(), channel.name));
   }
   return json;
 }
@@ -131,12 +124,11 @@ std::vector<ChannelBits> ParseBits(const nlohmann::json& json, const std::string
   try {
     for (const nlohmann::json& each : json) {
       ChannelBits channel;
-      channel.name = each.at("name").get<std::string>();
-      const auto ticks = each.at("ticks").get<size_t>();
-      const auto crc = each.at("crc64").get<std::string>();
-      const auto end = std::from_chars(crc.data(), crc.data() + crc.size(), channel.crc64, 16);
-      if (end.ec != std::errc() || end.ptr != crc.data() + crc.size()) {
-        throw LogError(fmt::format("{}: '{}' is no check sum", channel.name, crc));
+      size_t ticks = 0;
+      std::istringstream line(each.get<std::string>());
+      line >> std::hex >> channel.crc64 >> std::dec >> ticks >> channel.name;
+      if (!line || !line.eof()) {
+        throw LogError(fmt::format("'{}': is no check sum, ticks and channel", line.str()));
       }
       if (ticks > bytes.size() - position) {
         throw LogError(

@@ -33,7 +33,7 @@ struct BitsDifference {
 std::optional<BitsDifference> FirstDifference(const std::vector<ChannelBits>& recorded,
                                               const std::vector<ChannelBits>& seen);
 
-/// Names, numbers of ticks and check sums, without the bytes by tick.
+/// A text for each channel: its check sum, number of ticks and name; without the bytes by tick.
 nlohmann::ordered_json BitsJson(const std::vector<ChannelBits>& bits);
 /// Bytes by tick, one channel after the other.
 std::string BitsBytes(const std::vector<ChannelBits>& bits);
