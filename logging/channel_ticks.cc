@@ -1,7 +1,6 @@
 #include "logging/channel_ticks.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "components/framework/graph.h"
 #include "components/framework/modules.h"

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <exception>
 
 #include "components/robot_files/robot_files.h"
 #include "fmt/format.h"

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "components/framework/run.h"
 #include "fmt/format.h"
 #include "lcmtypes/message_scalars.h"
 #include "logging/printable.h"

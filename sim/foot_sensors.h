@@ -1,7 +1,6 @@
 // How the feet's simulated sensors fail.
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "components/robot/robot_model.h"

@@ -1,7 +1,5 @@
 #include "sim/sim_component.h"
 
-#include <algorithm>
-
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
 

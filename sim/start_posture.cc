@@ -1,7 +1,6 @@
 #include "sim/start_posture.h"
 
 #include <Eigen/QR>
-#include <cmath>
 #include <string>
 
 #include "components/framework/configuration/configuration.h"

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 
 #include "components/robot/robot_model.h"
 #include "hw_bridge/drive/units.h"

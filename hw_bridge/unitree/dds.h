@@ -5,7 +5,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <string>
 
 #include "hw_bridge/unitree/messages.h"
 #include "hw_bridge/unitree/unitree.pb.h"

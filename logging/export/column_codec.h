@@ -1,7 +1,6 @@
 // Columns of numbers packed for a page: fixed point, differences, byte planes, deflate, base64.
 #pragma once
 
-#include <cstdint>
 #include <span>
 #include <string>
 

@@ -5,7 +5,6 @@
 #include <google/protobuf/dynamic_message.h>
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>

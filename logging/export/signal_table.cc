@@ -8,7 +8,6 @@
 
 #include "components/framework/bus/packet_filter.h"
 #include "components/framework/operator_acts.h"
-#include "components/framework/run.h"
 #include "derived/message_traits.hpp"
 #include "fmt/format.h"
 #include "logging/derived/derived_reader.h"

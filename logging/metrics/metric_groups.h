@@ -3,8 +3,6 @@
 
 #include <cmath>
 #include <functional>
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "logging/metrics/analysis.h"

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "components/messages/conversions.h"
 #include "fmt/format.h"
 #include "logging/metrics/contact_history.h"
 #include "logging/metrics/metric_groups.h"

@@ -1,7 +1,6 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include "components/messages/conversions.h"

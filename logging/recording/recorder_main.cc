@@ -2,7 +2,6 @@
 
 #include <CLI/CLI.hpp>
 #include <csignal>
-#include <cstdio>
 
 #include "components/framework/build_info.h"
 #include "components/framework/configuration/configuration.h"

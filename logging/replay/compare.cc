@@ -1,10 +1,8 @@
 #include "logging/replay/compare.h"
 
-#include <algorithm>
 #include <map>
 #include <span>
 #include <utility>
-#include <vector>
 
 #include "components/framework/bus/packet_filter.h"
 #include "fmt/format.h"

@@ -1,7 +1,6 @@
 #include "logging/replay/component_replay.h"
 
 #include <algorithm>
-#include <memory>
 #include <set>
 
 #include "components/framework/bus/owned_message.h"

@@ -1,9 +1,7 @@
 #include "tools/cli/shell_text.h"
 
 #include <algorithm>
-#include <cctype>
 #include <functional>
-#include <string_view>
 #include <vector>
 
 #include "fmt/format.h"

@@ -1,7 +1,6 @@
 #include "tools/cli/signals.h"
 
 #include <csignal>
-#include <initializer_list>
 
 namespace poise {
 namespace {

@@ -15,7 +15,6 @@
 #include "tools/charts/sweep_output.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/shell_word.h"
-#include "tools/cli/signals.h"
 #include "tools/cli/temporary_dir.h"
 #include "tools/commands/commands.h"
 #include "tools/report/html_report.h"

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "hw_bridge/ethercat/distributed_clocks.h"
 #include "hw_bridge/ethercat/process_image.h"
 #include "hw_bridge/ethercat/topology.h"

@@ -9,7 +9,6 @@
 #include "components/framework/configuration/suggest.h"
 #include "components/framework/optional_ports.h"
 #include "components/robot_files/robot.pb.h"
-#include "components/robot_files/robot_files.h"
 #include "derived/message_traits.hpp"
 #include "fmt/format.h"
 #include "logging/derived/tick_messages.h"

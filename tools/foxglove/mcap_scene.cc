@@ -1,6 +1,5 @@
 #include "tools/foxglove/mcap_scene.h"
 
-#include <cmath>
 #include <cstdio>
 #include <utility>
 #include <vector>

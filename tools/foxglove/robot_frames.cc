@@ -1,6 +1,5 @@
 #include "tools/foxglove/robot_frames.h"
 
-#include <array>
 #include <map>
 
 #include "tools/foxglove/scene_parts.h"

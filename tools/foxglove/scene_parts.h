@@ -5,7 +5,6 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <span>
-#include <string>
 #include <string_view>
 
 #include "tools/foxglove/foxglove.pb.h"

@@ -1,7 +1,6 @@
 // A run as the topics that Foxglove and PlotJuggler know without being told anything.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <span>

@@ -9,7 +9,6 @@
 #include <optional>
 #include <vector>
 
-#include "components/framework/run.h"
 #include "components/framework/runners/inline_runner.h"
 #include "fmt/format.h"
 #include "logging/recording/inline_recorder.h"

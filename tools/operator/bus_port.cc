@@ -14,7 +14,6 @@
 #include "components/framework/graph.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
-#include "tools/scenario/registry.h"
 
 namespace poise {
 namespace {

@@ -2,10 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 

@@ -4,7 +4,6 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <functional>
-#include <map>
 #include <string>
 #include <vector>
 

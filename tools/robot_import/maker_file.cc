@@ -2,7 +2,6 @@
 
 #include <tinyxml2.h>
 
-#include <algorithm>
 #include <cmath>
 #include <sstream>
 

@@ -3,7 +3,6 @@
 
 #include <Eigen/Geometry>
 #include <filesystem>
-#include <map>
 #include <set>
 #include <string>
 #include <vector>

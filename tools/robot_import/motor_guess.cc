@@ -1,7 +1,6 @@
 #include "tools/robot_import/motor_guess.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
 #include <set>
 #include <tuple>

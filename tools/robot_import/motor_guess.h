@@ -5,7 +5,6 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "components/robot/link_tree.h"
 #include "components/robot_files/robot.pb.h"

@@ -1,6 +1,5 @@
 #include <google/protobuf/text_format.h>
 
-#include <map>
 #include <string_view>
 
 #include "fmt/format.h"

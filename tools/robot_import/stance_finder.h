@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <string>
 
 #include "components/robot/robot_model.h"
 #include "tools/robot_import/anatomy.h"

@@ -6,7 +6,6 @@
 #include <memory>
 #include <optional>
 #include <random>
-#include <string>
 #include <vector>
 
 #include "components/framework/graph.pb.h"

@@ -1,7 +1,6 @@
 // Runs a graph as processes: starts, watches and ends them.
 #pragma once
 
-#include <functional>
 #include <map>
 #include <memory>
 #include <string>

@@ -5,7 +5,6 @@
 #include <functional>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "components/framework/graph.pb.h"
 #include "tools/cli/output_place.h"

@@ -4,7 +4,6 @@
 
 #include <regex>
 #include <sstream>
-#include <utility>
 #include <vector>
 
 #include "components/framework/configuration/configuration.h"

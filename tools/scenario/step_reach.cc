@@ -5,8 +5,6 @@
 #include <cmath>
 #include <vector>
 
-#include "components/balance/support_polygon.h"
-
 namespace poise {
 namespace {
 

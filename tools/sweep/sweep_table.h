@@ -1,7 +1,6 @@
 // What a sweep or a search for limits came to, as tables.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 

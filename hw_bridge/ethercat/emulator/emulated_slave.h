@@ -2,7 +2,6 @@
 // of another slave.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <deque>
 #include <optional>
