@@ -4,6 +4,7 @@
 
 #include "components/framework/graph.h"
 #include "components/framework/modules.h"
+#include "components/framework/run.h"
 #include "fmt/format.h"
 #include "logging/run_log_writer.h"
 
@@ -13,12 +14,6 @@ namespace {
 // A tick beyond this is damage, not a run: 5 hours at 500 Hz.
 constexpr int64_t kMaxTicks = 10'000'000;
 constexpr int64_t kMinRecordSize = 29;  // bytes, of an event's header and a channel's name
-
-PacketFilter MakeFilter(const RunSpec& spec, const Channel& channel) {
-  const MessageType& type = ChannelType(channel);
-  const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
-  return {type.fingerprint, static_cast<int>(type.encoded_size(counts)), counts, spec.run_id()};
-}
 
 }  // namespace
 
@@ -60,13 +55,22 @@ void CheckLogSpec(const RunSpec& spec, const std::string& path) {
 
 const MessageType& ChannelType(const Channel& channel) { return *FindMessageType(channel.type()); }
 
+int64_t MessageSize(const Channel& channel) {
+  return ChannelType(channel).encoded_size(CountsOf(channel));
+}
+
+PacketFilter ChannelFilter(const RunSpec& spec, const Channel& channel) {
+  return {ChannelType(channel).fingerprint, static_cast<int>(MessageSize(channel)),
+          CountsOf(channel), spec.run_id()};
+}
+
 bool IsKept(const RunSpec& spec, const std::string& channel) {
   const auto& kept = spec.cut().channel();
   return kept.empty() || std::find(kept.begin(), kept.end(), channel) != kept.end();
 }
 
 ChannelTicks::ChannelTicks(const RunSpec& spec, const Channel& channel, uint64_t log_size)
-    : filter_(MakeFilter(spec, channel)),
+    : filter_(ChannelFilter(spec, channel)),
       fingerprint_(ChannelType(channel).fingerprint),
       first_tick_(spec.cut().first_tick()),
       end_tick_(spec.num_ticks() > 0 ? std::min(spec.num_ticks(), kMaxTicks) : kMaxTicks) {

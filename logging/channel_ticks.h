@@ -37,6 +37,9 @@ void CheckLogSpec(const RunSpec& spec, const std::string& path);
 
 /// The type of a channel that CheckLogSpec has passed.
 const MessageType& ChannelType(const Channel& channel);
+/// Bytes of each message of such a channel, and what it must show.
+int64_t MessageSize(const Channel& channel);
+PacketFilter ChannelFilter(const RunSpec& spec, const Channel& channel);
 
 /// False when the log, cut from another one, is not to hold the channel.
 bool IsKept(const RunSpec& spec, const std::string& channel);

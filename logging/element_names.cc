@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 
+#include "components/framework/run.h"
 #include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
 #include "lcmtypes/field_table.h"
@@ -57,13 +58,7 @@ ElementNames ElementNames::OfTexts(std::string_view robot_text, std::string_view
 }
 
 ElementNames ElementNames::OfSpec(const RunSpec& spec) {
-  std::string robot;
-  std::string urdf;
-  for (const Resource& resource : spec.resource()) {
-    if (resource.name() == "robot") robot = resource.text();
-    if (resource.name() == "urdf") urdf = resource.text();
-  }
-  return OfTexts(robot, urdf);
+  return OfTexts(ResourceOf(spec, "robot").text(), ResourceOf(spec, "urdf").text());
 }
 
 const std::vector<std::string>& ElementNames::Of(std::string_view type,

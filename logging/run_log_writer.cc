@@ -20,8 +20,8 @@ RunLogWriter::RunLogWriter(const std::string& path, const RunSpec& spec, const r
   health_utime_offset_ = FindMessageType("health_t")->run_id_offset + 16;
   for (const Channel& channel : spec.graph().channel()) {
     const MessageType* type = FindMessageType(channel.type());
-    const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
-    if (type == nullptr || !type->has_header || counts.size() != type->count_names.size()) {
+    if (type == nullptr || !type->has_header ||
+        static_cast<size_t>(channel.count_size()) != type->count_names.size()) {
       throw ConfigError(
           fmt::format("channel {}: no type and counts of a channel's message; fill "
                       "them in from the checked graph",
@@ -30,7 +30,7 @@ RunLogWriter::RunLogWriter(const std::string& path, const RunSpec& spec, const r
     Lane lane;
     lane.name = channel.name();
     lane.external = channel.external();
-    lane.size = static_cast<size_t>(type->encoded_size(counts));
+    lane.size = static_cast<size_t>(type->encoded_size(CountsOf(channel)));
     lane.utime_offset = type->run_id_offset + 16;
     if (!lane.external) {
       lane.bytes.resize(lane.size * static_cast<size_t>(capacity_));
@@ -135,10 +135,8 @@ run_info_t MakeRunInfo(const RunSpec& spec, const std::string& scenario) {
   info.run_id = spec.run_id();
   google::protobuf::TextFormat::PrintToString(spec, &info.run_spec);
   info.scenario = scenario;
-  for (const Resource& resource : spec.resource()) {
-    if (resource.name() == "robot") info.robot = resource.text();
-    if (resource.name() == "urdf") info.urdf = resource.text();
-  }
+  info.robot = ResourceOf(spec, "robot").text();
+  info.urdf = ResourceOf(spec, "urdf").text();
   const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
   info.started_at = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(now));
   return info;

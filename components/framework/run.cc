@@ -51,6 +51,11 @@ const std::string& TypeOf(const ComponentInstance& instance) {
   return instance.has_type() ? instance.type() : instance.name();
 }
 
+const Resource& ResourceOf(const RunSpec& spec, std::string_view name) {
+  const auto found = std::ranges::find(spec.resource(), name, &Resource::name);
+  return found == spec.resource().end() ? Resource::default_instance() : *found;
+}
+
 const std::string& ProcessOf(const ComponentInstance& instance) {
   return instance.has_process() ? instance.process() : instance.name();
 }

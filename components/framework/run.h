@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -24,6 +25,14 @@ uint64_t InstanceSeed(uint64_t seed, std::string_view name);
 
 /// Component type of an instance: its type, or its name when it has none.
 const std::string& TypeOf(const ComponentInstance& instance);
+
+/// The lengths of a channel's arrays.
+inline std::span<const int32_t> CountsOf(const Channel& channel) {
+  return {channel.count().data(), static_cast<size_t>(channel.count_size())};
+}
+
+/// The run's resource of a name, as "robot"; an empty one where it has none.
+const Resource& ResourceOf(const RunSpec& spec, std::string_view name);
 
 /// Process that an instance runs in: its process, or its name when it has none.
 const std::string& ProcessOf(const ComponentInstance& instance);

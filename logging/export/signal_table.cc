@@ -10,6 +10,7 @@
 #include "components/framework/operator_acts.h"
 #include "derived/message_traits.hpp"
 #include "fmt/format.h"
+#include "logging/channel_ticks.h"
 #include "logging/derived/derived_reader.h"
 #include "logging/derived/told.h"
 #include "poise/message_traits.hpp"
@@ -125,14 +126,9 @@ class ColumnSource {
   ColumnSource(const std::string& path, const RunRecord& run)
       : run_(run), reader_(path), events_(&reader_, run.spec, &run.robot) {
     for (const Channel& channel : run.spec.graph().channel()) {
-      const MessageType* type = FindMessageType(channel.type());
-      const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
-      lanes_.try_emplace(
-          channel.name(),
-          Lane{order_.size(), type,
-               PacketFilter(type->fingerprint, static_cast<int>(type->encoded_size(counts)), counts,
-                            run.spec.run_id()),
-               channel.external()});
+      lanes_.try_emplace(channel.name(),
+                         Lane{order_.size(), &ChannelType(channel),
+                              ChannelFilter(run.spec, channel), channel.external()});
       order_.push_back(channel.name());
     }
   }

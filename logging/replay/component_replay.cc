@@ -280,8 +280,7 @@ class ReplayedStages {
 
   void CheckSize(int channel, int size) const {
     const Channel& c = log_.spec().graph().channel(channel);
-    const std::vector<int32_t> counts(c.count().begin(), c.count().end());
-    if (lane(channel).type->encoded_size(counts) != size) {
+    if (MessageSize(c) != size) {
       Fail(fmt::format("{}: its messages do not have the counts of the log's robot", c.name()));
     }
   }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/run.h"
 #include "fmt/format.h"
 #include "logging/log_reader.h"
 #include "poise/message_traits.hpp"
@@ -77,9 +78,8 @@ int64_t ExpectedLogSize(const RunSpec& spec) {
   for (const Channel& channel : spec.graph().channel()) {
     const MessageType* const type = FindMessageType(channel.type());
     if (channel.external() || type == nullptr) continue;
-    const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
     tick += kRecordHeader + static_cast<int64_t>(channel.name().size()) +
-            static_cast<int64_t>(type->encoded_size(counts));
+            static_cast<int64_t>(type->encoded_size(CountsOf(channel)));
   }
   const double channels = static_cast<double>(tick) * static_cast<double>(spec.num_ticks());
   return spec.num_ticks() == 0 ? 0 : kRunInfo + static_cast<int64_t>(kBesides * channels);

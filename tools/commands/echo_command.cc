@@ -10,6 +10,7 @@
 #include "components/framework/clock.h"
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/suggest.h"
+#include "components/framework/run.h"
 #include "fmt/format.h"
 #include "logging/log_messages.h"
 #include "poise/health_t.hpp"
@@ -139,8 +140,7 @@ void CheckLive(const LiveRun& live, const EchoOptions& options, EchoOutput* outp
   for (const Channel& channel : live.spec().graph().channel()) {
     if (channel.name() != options.channel) continue;
     const MessageType& type = *FindMessageType(channel.type());
-    const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
-    output->Check(type, ZeroMessage(type, counts));
+    output->Check(type, ZeroMessage(type, CountsOf(channel)));
     return;
   }
   const std::vector<std::string> names = live.ChannelNames();

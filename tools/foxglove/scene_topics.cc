@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "components/framework/run.h"
 #include "components/messages/conversions.h"
 #include "fmt/format.h"
 #include "logging/printable.h"
@@ -113,9 +114,7 @@ int64_t SceneTopics::Utime(double time) const {
 
 void SceneTopics::Begin() {
   MeshPlaces places;  // those of the machine that the run was on, if it is this one
-  for (const Resource& resource : run_.spec.resource()) {
-    if (resource.name() == "urdf") places.maker_file = resource.file();
-  }
+  places.maker_file = ResourceOf(run_.spec, "urdf").file();
   const RobotDrawing drawing = DrawRobot(run_.robot, run_.info.urdf, places, kSceneTriangles);
   Publish(kFixedFrames, 0, frames_.Fixed(0));
   Publish(kRobot, 0, frames_.Picture(drawing, 0));

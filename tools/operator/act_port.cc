@@ -144,12 +144,8 @@ const ActPort::Targets& ActPort::targets() const {
     };
     if (std::ranges::any_of(type->ports, moves)) targets.tasks = i;
   }
-  std::string robot, urdf;
-  for (const Resource& resource : spec_.resource()) {
-    if (resource.name() == "robot") robot = resource.text();
-    if (resource.name() == "urdf") urdf = resource.text();
-  }
-  const robot::RobotModel model = robot::LoadRobotTexts(robot, urdf);
+  const robot::RobotModel model =
+      robot::LoadRobotTexts(ResourceOf(spec_, "robot").text(), ResourceOf(spec_, "urdf").text());
   targets.weight = model.total_mass() * robot::kGravity;
   for (const auto& body : model.bodies()) targets.bodies.push_back(body.name);
   for (const auto& foot : model.feet()) targets.feet.push_back(foot.name);

@@ -18,6 +18,7 @@
 #include "derived/message_traits.hpp"
 #include "fmt/format.h"
 #include "lcmtypes/field_table.h"
+#include "logging/channel_ticks.h"
 #include "logging/events/events.h"
 #include "logging/export/column_codec.h"
 #include "logging/export/signal_table.h"
@@ -192,8 +193,7 @@ logging::PageRows RowsOf(const logging::RunRecord& record,
   double signals =
       static_cast<double>(MessageTraits<derived::signals_t>::EncodedSize(joints_and_feet)) / 8;
   for (const Channel& channel : record.spec.graph().channel()) {
-    const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
-    signals += static_cast<double>(FindMessageType(channel.type())->encoded_size(counts)) / 8;
+    signals += static_cast<double>(logging::MessageSize(channel)) / 8;
   }
   const double share = megabytes / signals;
   if (static_cast<double>(record.num_ticks - first) <= kNumbersPerMegabyte * share) {

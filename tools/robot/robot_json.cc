@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "components/balance/support_polygon.h"
+#include "components/framework/run.h"
 #include "tools/robot/robot_check.h"
 
 namespace poise {
@@ -25,9 +26,7 @@ Json PoseJson(const Eigen::Isometry3d& pose) {
 
 Json RobotJson(const logging::RunRecord& run) {
   MeshPlaces places;  // those of the machine that the run was on, if it is this one
-  for (const Resource& resource : run.spec.resource()) {
-    if (resource.name() == "urdf") places.maker_file = resource.file();
-  }
+  places.maker_file = ResourceOf(run.spec, "urdf").file();
   return RobotJson(run.robot, DrawRobot(run.robot, run.info.urdf, places, kRunTriangles));
 }
 

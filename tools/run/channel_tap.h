@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "components/framework/bus/packet_filter.h"
 #include "components/framework/bus/run_socket.h"
 #include "components/framework/graph.pb.h"
 #include "components/framework/run.h"
+#include "logging/channel_ticks.h"
 #include "poise/message_traits.hpp"
 
 namespace poise {
@@ -27,7 +27,7 @@ class ChannelTap {
   /// Throws BusError. `channel`: index of one of type T in the graph, whose counts are filled in.
   ChannelTap(const RunSpec& spec, int channel)
       : name_(spec.graph().channel(channel).name()),
-        filter_(MakeFilter(spec, spec.graph().channel(channel))),
+        filter_(logging::ChannelFilter(spec, spec.graph().channel(channel))),
         receiver_(ChannelUrl(spec, channel), OfRun(spec)) {}
 
   int fd() const { return receiver_.fd(); }
@@ -46,13 +46,6 @@ class ChannelTap {
   }
 
  private:
-  static PacketFilter MakeFilter(const RunSpec& spec, const Channel& channel) {
-    const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
-    T message{};
-    MessageTraits<T>::Resize(message, counts);
-    return {T::getHash(), message.getEncodedSize(), counts, spec.run_id()};
-  }
-
   std::string name_;
   PacketFilter filter_;
   BusReceiver receiver_;

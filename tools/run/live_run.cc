@@ -13,6 +13,7 @@
 #include "components/framework/modules.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
+#include "logging/channel_ticks.h"
 #include "tools/run/run_registry.h"
 
 namespace poise {
@@ -94,12 +95,8 @@ LiveRun::LiveRun(const std::string& run, std::string_view log_command, std::stri
                       (dir_ / "run_spec.pbtxt").string(), channel.name(), channel.type(),
                       type == nullptr ? " " + ModulesSearched() : ""));
     }
-    const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
-    lanes_.emplace(channel.name(), Lane{i, type,
-                                        PacketFilter(type->fingerprint,
-                                                     static_cast<int>(type->encoded_size(counts)),
-                                                     counts, spec_.run_id()),
-                                        channel.external()});
+    lanes_.emplace(channel.name(),
+                   Lane{i, type, logging::ChannelFilter(spec_, channel), channel.external()});
   }
   for (const ComponentInstance& instance : spec_.graph().component()) {
     health_channels_.push_back(HealthChannel(instance.name()));

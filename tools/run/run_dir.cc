@@ -198,10 +198,7 @@ RunSpec ReadRunSpec(const std::string& run) {
 }
 
 std::string RobotNameOf(const RunSpec& spec) {
-  for (const Resource& resource : spec.resource()) {
-    if (resource.name() == "robot") return fs::path(resource.file()).stem().string();
-  }
-  return "";
+  return fs::path(ResourceOf(spec, "robot").file()).stem().string();
 }
 
 }  // namespace poise
