@@ -3,96 +3,57 @@
 #include <cmath>
 
 #include "fmt/format.h"
+#include "logging/events/code_names.h"
 
 namespace poise::logging {
+namespace {
 
-std::string BridgeStateName(int8_t state) {
-  switch (state) {
-    case bridge_status_t::STATE_INIT:
-      return "init";
-    case bridge_status_t::STATE_RUNNING:
-      return "running";
-    case bridge_status_t::STATE_DAMPING:
-      return "damping";
-    case bridge_status_t::STATE_STOPPING:
-      return "stopping";
-    case bridge_status_t::STATE_ENABLING:
-      return "enabling";
-    case bridge_status_t::STATE_HOLDING:
-      return "holding";
-    case bridge_status_t::STATE_STOPPED:
-      return "stopped";
-    case bridge_status_t::STATE_ESTOP:
-      return "emergency stop";
-    default:
-      return fmt::format("state {}", state);
-  }
-}
+using S = bridge_status_t;
 
-std::string BridgeReasonName(int8_t reason) {
-  switch (reason) {
-    case bridge_status_t::REASON_NONE:
-      return "";
-    case bridge_status_t::REASON_NO_COMMAND:
-      return "no command";
-    case bridge_status_t::REASON_COMMAND_NOT_FINITE:
-      return "command not finite, or with a negative stiffness or damping";
-    case bridge_status_t::REASON_COMMAND_STALE:
-      return "command stale";
-    case bridge_status_t::REASON_COMMAND_SEQUENCE:
-      return "command out of sequence";
-    case bridge_status_t::REASON_COMMAND_SIZE:
-      return "command of wrong size";
-    case bridge_status_t::REASON_COMMAND_RUN:
-      return "command of another run";
-    case bridge_status_t::REASON_OPERATOR:
-      return "operator";
-    case bridge_status_t::REASON_DRIVE_FAULT:
-      return "drive fault";
-    case bridge_status_t::REASON_FEEDBACK_NOT_FINITE:
-      return "feedback not finite";
-    case bridge_status_t::REASON_DRIVE_NOT_ENABLED:
-      return "drive not enabled";
-    case bridge_status_t::REASON_START_POSITION:
-      return "joint out of its range at the start";
-    case bridge_status_t::REASON_START_VELOCITY:
-      return "joint moving at the start";
-    case bridge_status_t::REASON_JOINT_POSITION:
-      return "joint beyond its range";
-    case bridge_status_t::REASON_JOINT_VELOCITY:
-      return "joint too fast";
-    case bridge_status_t::REASON_BODY_TILT:
-      return "body tilted";
-    case bridge_status_t::REASON_BUS_INPUTS:
-      return "inputs of the bus incomplete";
-    case bridge_status_t::REASON_BUS_LINK:
-      return "bus link lost";
-    case bridge_status_t::REASON_CYCLE_OVERRUN:
-      return "cycle overruns";
-    case bridge_status_t::REASON_ENCODER_FROZEN:
-      return "encoder frozen";
-    case bridge_status_t::REASON_ENCODER_JUMP:
-      return "encoder jump";
-    case bridge_status_t::REASON_TORQUE_IMPLAUSIBLE:
-      return "torque implausible";
-    case bridge_status_t::REASON_DRIVE_STO:
-      return "safe torque off";
-    case bridge_status_t::REASON_SIGNAL:
-      return "signal";
-    case bridge_status_t::REASON_SHUTDOWN:
-      return "shutdown";
-    case bridge_status_t::REASON_REMOTE_STOP:
-      return "remote's stop button";
-    case bridge_status_t::REASON_MOTOR_TEMPERATURE:
-      return "motor too hot";
-    case bridge_status_t::REASON_SUPPLY_VOLTAGE:
-      return "supply voltage too low";
-    case bridge_status_t::REASON_ROBOT_MODE:
-      return "robot no longer under low-level commands";
-    default:
-      return fmt::format("reason {}", reason);
-  }
-}
+constexpr CodeName kStates[] = {
+    {S::STATE_INIT, "init"},         {S::STATE_RUNNING, "running"},
+    {S::STATE_DAMPING, "damping"},   {S::STATE_STOPPING, "stopping"},
+    {S::STATE_ENABLING, "enabling"}, {S::STATE_HOLDING, "holding"},
+    {S::STATE_STOPPED, "stopped"},   {S::STATE_ESTOP, "emergency stop"},
+};
+
+constexpr CodeName kReasons[] = {
+    {S::REASON_NONE, ""},
+    {S::REASON_NO_COMMAND, "no command"},
+    {S::REASON_COMMAND_NOT_FINITE, "command not finite, or with a negative stiffness or damping"},
+    {S::REASON_COMMAND_STALE, "command stale"},
+    {S::REASON_COMMAND_SEQUENCE, "command out of sequence"},
+    {S::REASON_COMMAND_SIZE, "command of wrong size"},
+    {S::REASON_COMMAND_RUN, "command of another run"},
+    {S::REASON_OPERATOR, "operator"},
+    {S::REASON_DRIVE_FAULT, "drive fault"},
+    {S::REASON_FEEDBACK_NOT_FINITE, "feedback not finite"},
+    {S::REASON_DRIVE_NOT_ENABLED, "drive not enabled"},
+    {S::REASON_START_POSITION, "joint out of its range at the start"},
+    {S::REASON_START_VELOCITY, "joint moving at the start"},
+    {S::REASON_JOINT_POSITION, "joint beyond its range"},
+    {S::REASON_JOINT_VELOCITY, "joint too fast"},
+    {S::REASON_BODY_TILT, "body tilted"},
+    {S::REASON_BUS_INPUTS, "inputs of the bus incomplete"},
+    {S::REASON_BUS_LINK, "bus link lost"},
+    {S::REASON_CYCLE_OVERRUN, "cycle overruns"},
+    {S::REASON_ENCODER_FROZEN, "encoder frozen"},
+    {S::REASON_ENCODER_JUMP, "encoder jump"},
+    {S::REASON_TORQUE_IMPLAUSIBLE, "torque implausible"},
+    {S::REASON_DRIVE_STO, "safe torque off"},
+    {S::REASON_SIGNAL, "signal"},
+    {S::REASON_SHUTDOWN, "shutdown"},
+    {S::REASON_REMOTE_STOP, "remote's stop button"},
+    {S::REASON_MOTOR_TEMPERATURE, "motor too hot"},
+    {S::REASON_SUPPLY_VOLTAGE, "supply voltage too low"},
+    {S::REASON_ROBOT_MODE, "robot no longer under low-level commands"},
+};
+
+}  // namespace
+
+std::string BridgeStateName(int8_t state) { return NameOf(kStates, state, "state"); }
+
+std::string BridgeReasonName(int8_t reason) { return NameOf(kReasons, reason, "reason"); }
 
 std::string BridgeReasonText(const bridge_status_t& bridge, const ElementNames& names) {
   const std::string reason = BridgeReasonName(bridge.reason);

@@ -1,6 +1,7 @@
 #include "logging/events/operator_words.h"
 
 #include "fmt/format.h"
+#include "logging/events/code_names.h"
 #include "operate/act_t.hpp"
 #include "operate/answer_t.hpp"
 
@@ -9,28 +10,22 @@ namespace poise::logging {
 using operate::act_t;
 using operate::answer_t;
 
-std::string ActKindName(int8_t kind) {
-  switch (kind) {
-    case act_t::KIND_PUSH:
-      return "push";
-    case act_t::KIND_SETTING:
-      return "setting";
-    case act_t::KIND_ASK:
-      return "question for a setting";
-    case act_t::KIND_STEP:
-      return "step";
-    case act_t::KIND_WALK:
-      return "walk";
-    case act_t::KIND_STAND:
-      return "feet side by side";
-    case act_t::KIND_NEXT_PHASE:
-      return "next phase";
-    case act_t::KIND_JOINT:
-      return "move of a joint";
-    default:
-      return fmt::format("act of kind {}", kind);
-  }
-}
+namespace {
+
+constexpr CodeName kKinds[] = {
+    {act_t::KIND_PUSH, "push"},
+    {act_t::KIND_SETTING, "setting"},
+    {act_t::KIND_ASK, "question for a setting"},
+    {act_t::KIND_STEP, "step"},
+    {act_t::KIND_WALK, "walk"},
+    {act_t::KIND_STAND, "feet side by side"},
+    {act_t::KIND_NEXT_PHASE, "next phase"},
+    {act_t::KIND_JOINT, "move of a joint"},
+};
+
+}  // namespace
+
+std::string ActKindName(int8_t kind) { return NameOf(kKinds, kind, "act of kind"); }
 
 std::string RefusalReason(int8_t kind, int8_t verdict) {
   const bool stand = kind == act_t::KIND_STAND;

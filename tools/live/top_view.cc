@@ -6,6 +6,7 @@
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "logging/events/bridge_words.h"
+#include "logging/events/code_names.h"
 #include "logging/printable.h"
 #include "tools/cli/text_table.h"
 #include "tools/report/report.h"
@@ -30,22 +31,13 @@ std::string Rate(double bytes_per_second) {
                                 : fmt::format("{:.2f} MB/s", bytes_per_second * 1e-6);
 }
 
-std::string StateName(int8_t state) {
-  switch (state) {
-    case health_t::STATE_STARTING:
-      return "starting";
-    case health_t::STATE_READY:
-      return "ready";
-    case health_t::STATE_RUNNING:
-      return "running";
-    case health_t::STATE_FINISHED:
-      return "finished";
-    case health_t::STATE_FAILED:
-      return "FAILED";
-    default:
-      return fmt::format("state {}", state);
-  }
-}
+constexpr logging::CodeName kStates[] = {
+    {health_t::STATE_STARTING, "starting"}, {health_t::STATE_READY, "ready"},
+    {health_t::STATE_RUNNING, "running"},   {health_t::STATE_FINISHED, "finished"},
+    {health_t::STATE_FAILED, "FAILED"},
+};
+
+std::string StateName(int8_t state) { return logging::NameOf(kStates, state, "state"); }
 
 void AddHeader(const RunSpec& spec, const logging::ElementNames& names, const std::string& dir,
                const LiveSnapshot& snapshot, int64_t refused, std::vector<ViewLine>* lines) {

@@ -3,29 +3,12 @@
 namespace poise {
 
 const char* ToString(PacketVerdict verdict) {
-  switch (verdict) {
-    case PacketVerdict::kAccepted:
-      return "accepted";
-    case PacketVerdict::kWrongSize:
-      return "wrong size";
-    case PacketVerdict::kWrongFingerprint:
-      return "wrong fingerprint";
-    case PacketVerdict::kWrongCounts:
-      return "wrong counts";
-    case PacketVerdict::kWrongRun:
-      return "wrong run";
-    case PacketVerdict::kStaleTick:
-      return "stale tick";
-    case PacketVerdict::kFutureTick:
-      return "future tick";
-    case PacketVerdict::kNotFinite:
-      return "not finite";
-    case PacketVerdict::kConflicting:
-      return "conflicting";
-    case PacketVerdict::kNumVerdicts:
-      break;
-  }
-  return "unknown";
+  constexpr std::array kNames = {"accepted",     "wrong size", "wrong fingerprint",
+                                 "wrong counts", "wrong run",  "stale tick",
+                                 "future tick",  "not finite", "conflicting"};
+  static_assert(kNames.size() == static_cast<size_t>(PacketVerdict::kNumVerdicts));
+  const auto i = static_cast<size_t>(verdict);
+  return i < kNames.size() ? kNames[i] : "unknown";
 }
 
 int32_t ReadInt32(const uint8_t* data) {
