@@ -9,8 +9,6 @@
 namespace poise::logging {
 namespace {
 
-constexpr uint32_t kEventLogMagic = 0xEDA1DA01u;
-
 /// Big endian.
 template <class Word>
 void Append(Word word, std::vector<uint8_t>* to) {
@@ -27,15 +25,20 @@ EventLogWriter::EventLogWriter(const std::string& path)
   RemoveSums(path);
 }
 
+void PutRecord(int64_t number, std::string_view channel, int64_t utime,
+               std::span<const uint8_t> data, std::vector<uint8_t>* record) {
+  record->clear();
+  Append(kEventLogMagic, record);
+  Append(static_cast<uint64_t>(number), record);
+  Append(static_cast<uint64_t>(utime), record);
+  Append(static_cast<uint32_t>(channel.size()), record);
+  Append(static_cast<uint32_t>(data.size()), record);
+  record->insert(record->end(), channel.begin(), channel.end());
+  record->insert(record->end(), data.begin(), data.end());
+}
+
 void EventLogWriter::Write(std::string_view channel, int64_t utime, std::span<const uint8_t> data) {
-  record_.clear();
-  Append(kEventLogMagic, &record_);
-  Append(static_cast<uint64_t>(events_), &record_);
-  Append(static_cast<uint64_t>(utime), &record_);
-  Append(static_cast<uint32_t>(channel.size()), &record_);
-  Append(static_cast<uint32_t>(data.size()), &record_);
-  record_.insert(record_.end(), channel.begin(), channel.end());
-  record_.insert(record_.end(), data.begin(), data.end());
+  PutRecord(events_, channel, utime, data, &record_);
   if (std::fwrite(record_.data(), 1, record_.size(), log_->f) != record_.size()) {
     throw LogError(fmt::format("{}: writing failed: {}", path_, std::strerror(errno)));
   }

@@ -21,6 +21,13 @@ class LogError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// What a record of LCM's format begins with, and the bytes before its channel's name.
+inline constexpr uint32_t kEventLogMagic = 0xEDA1DA01u;
+inline constexpr size_t kEventLogHeader = 28;
+/// Makes `record` that of an event.
+void PutRecord(int64_t number, std::string_view channel, int64_t utime,
+               std::span<const uint8_t> data, std::vector<uint8_t>* record);
+
 /// One log in LCM's format; events are numbered from 0. A record is put together here: liblcm's own
 /// function writes it in eight pieces.
 class EventLogWriter {

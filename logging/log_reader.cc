@@ -1,24 +1,17 @@
 #include "logging/log_reader.h"
 
-#include <fcntl.h>
 #include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cstring>
 #include <fstream>
 
 #include "components/framework/bus/packet_filter.h"
-#include "fmt/format.h"
 
 namespace poise::logging {
 namespace {
 
-constexpr size_t kHeaderSize = 4 + 8 + 8 + 4 + 4;
-constexpr uint32_t kMagic = 0xEDA1DA01u;
 constexpr int32_t kMaxChannel = 63;  // LCM_MAX_CHANNEL_NAME_LENGTH
 constexpr int32_t kMaxData = 1 << 28;
 
@@ -28,12 +21,14 @@ constexpr int kMaxMagics = 64;
 constexpr size_t kHeldBytes = 16 << 20;  // of the file, behind the place of reading
 constexpr uint8_t kMagicBytes[] = {0xED, 0xA1, 0xDA, 0x01};
 
-bool MagicAt(const uint8_t* data) { return static_cast<uint32_t>(ReadInt32(data)) == kMagic; }
+bool MagicAt(const uint8_t* data) {
+  return static_cast<uint32_t>(ReadInt32(data)) == kEventLogMagic;
+}
 
 /// Size of the record whose header begins at `header`, with `left` bytes of the file from there; 0
 /// when none can begin there.
 size_t RecordSize(const uint8_t* header, size_t left) {
-  if (left < kHeaderSize || !MagicAt(header)) return 0;
+  if (left < kEventLogHeader || !MagicAt(header)) return 0;
   const int32_t channel_length = ReadInt32(header + 20);
   const int32_t data_length = ReadInt32(header + 24);
   if (channel_length < 1 || channel_length > kMaxChannel || data_length < 0 ||
@@ -41,7 +36,7 @@ size_t RecordSize(const uint8_t* header, size_t left) {
     return 0;
   }
   const size_t size =
-      kHeaderSize + static_cast<size_t>(channel_length) + static_cast<size_t>(data_length);
+      kEventLogHeader + static_cast<size_t>(channel_length) + static_cast<size_t>(data_length);
   return size <= left ? size : 0;
 }
 
@@ -63,9 +58,9 @@ bool SwallowsRecord(const uint8_t* record, size_t size, const uint8_t* end) {
   if (ends_well && end - next >= 12 && static_cast<uint64_t>(ReadInt64(next + 4)) == number + 1) {
     return false;
   }
-  const uint8_t* data = record + kHeaderSize;
+  const uint8_t* data = record + kEventLogHeader;
   const uint8_t* const last =
-      std::min(record + size, end - std::min<ptrdiff_t>(12, end - (record + kHeaderSize)));
+      std::min(record + size, end - std::min<ptrdiff_t>(12, end - (record + kEventLogHeader)));
   for (int magics = 0; data < last; ++magics) {
     const size_t reach = static_cast<size_t>(last - data) + sizeof(kMagicBytes) - 1;
     const void* const found = memmem(data, reach, kMagicBytes, sizeof(kMagicBytes));
@@ -89,32 +84,8 @@ bool IsEventLog(const std::string& path) {
          std::memcmp(begin.data(), kMagicBytes, sizeof(kMagicBytes)) == 0;
 }
 
-LogReader::LogReader(const std::string& path) {
-  const auto fail = [&](const char* what) {
-    throw LogError(fmt::format("{}: {}: {}", path, what, std::strerror(errno)));
-  };
-  const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (fd < 0) fail("cannot be read");
-  struct stat status {};
-  if (fstat(fd, &status) != 0 || !S_ISREG(status.st_mode)) {
-    close(fd);
-    throw LogError(fmt::format("{}: is not a file", path));
-  }
-  size_ = static_cast<size_t>(status.st_size);
-  if (size_ > 0) {
-    void* const map = mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, fd, 0);
-    if (map == MAP_FAILED) {
-      close(fd);
-      fail("cannot be read");
-    }
-    data_ = static_cast<const uint8_t*>(map);
-  }
-  close(fd);
-}
-
-LogReader::~LogReader() {
-  if (data_ != nullptr) munmap(const_cast<uint8_t*>(data_), size_);
-}
+LogReader::LogReader(const std::string& path)
+    : file_(path), data_(file_.data()), size_(file_.size()) {}
 
 bool LogReader::ParseAt(size_t position, LogEvent* event, size_t* end) const {
   const uint8_t* const header = data_ + position;
@@ -124,8 +95,9 @@ bool LogReader::ParseAt(size_t position, LogEvent* event, size_t* end) const {
   const auto channel_length = static_cast<size_t>(ReadInt32(header + 20));
   event->number = ReadInt64(header + 4);
   event->utime = ReadInt64(header + 12);
-  event->channel = {reinterpret_cast<const char*>(header + kHeaderSize), channel_length};
-  event->data = {header + kHeaderSize + channel_length, size - kHeaderSize - channel_length};
+  event->channel = {reinterpret_cast<const char*>(header + kEventLogHeader), channel_length};
+  event->data = {header + kEventLogHeader + channel_length,
+                 size - kEventLogHeader - channel_length};
   event->offset = position;
   return true;
 }
@@ -177,7 +149,7 @@ std::optional<int64_t> LogDamage::lost_events() const {
   if (!number_after || *number_after <= number_before || number_before < -1) return {};
   const uint64_t lost =
       static_cast<uint64_t>(*number_after) - static_cast<uint64_t>(number_before) - 1;
-  if (lost > size / (kHeaderSize + 1)) return {};
+  if (lost > size / (kEventLogHeader + 1)) return {};
   return static_cast<int64_t>(lost);
 }
 

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "logging/paged_file.h"
 #include "logging/run_log_writer.h"
 
 namespace poise::logging {
@@ -40,9 +41,6 @@ class LogReader {
  public:
   /// Throws LogError.
   explicit LogReader(const std::string& path);
-  ~LogReader();
-  LogReader(const LogReader&) = delete;
-  LogReader& operator=(const LogReader&) = delete;
 
   /// False at the end. The event's channel and data live as long as the reader.
   bool Next(LogEvent* event);
@@ -61,8 +59,9 @@ class LogReader {
   bool ParseAt(size_t position, LogEvent* event, size_t* end) const;
   void LetGo();
 
-  const uint8_t* data_ = nullptr;
-  size_t size_ = 0;
+  PagedFile file_;
+  const uint8_t* data_;
+  size_t size_;
   size_t position_ = 0;
   size_t released_ = 0;  // pages before it were let go
   int64_t number_ = -1;  // of the last event

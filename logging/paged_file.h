@@ -21,6 +21,8 @@ class PagedFile {
   PagedFile& operator=(const PagedFile&) = delete;
 
   uint64_t size() const { return size_; }
+  /// All bytes, for who lets go of what it has looked at; nullptr without any.
+  const uint8_t* data() const { return data_; }
   /// The bytes from `offset` on, below size(); they may be looked at until the next Append or
   /// Resize.
   const uint8_t* At(uint64_t offset) {

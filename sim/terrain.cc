@@ -17,7 +17,6 @@ using std::numbers::pi;
 namespace {
 
 constexpr uint64_t kTerrainStream = 1, kFieldStream = 101;
-constexpr int kMostRows = 64;
 constexpr double kLaneMiddle = 0.1;  // m from y = 0, about where feet come down
 
 Vector2d Slope(double roll, double pitch) {

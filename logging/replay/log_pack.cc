@@ -27,8 +27,6 @@ namespace {
 constexpr char kPackChannel[] = "LOG_PACK";
 constexpr int kPackFormat = 1;
 constexpr int64_t kBlockEvents = 4096;
-constexpr size_t kRecordHeader = 28;
-constexpr uint32_t kRecordMagic = 0xEDA1DA01u;
 constexpr int64_t kTicksPerCall = 500;  // of OnTick
 
 /// An event that no component makes again.
@@ -47,10 +45,6 @@ struct PackedRun {
   uint64_t bytes = 0;
   std::vector<uint32_t> blocks;  // CRC-32 of each kBlockEvents records
 };
-
-void PutBigEndian(uint64_t value, int bytes, std::vector<uint8_t>* to) {
-  for (int i = bytes; i-- > 0;) to->push_back(static_cast<uint8_t>(value >> (8 * i)));
-}
 
 /// Check sums of records as they stand in a file.
 class BlockSums {
@@ -144,14 +138,7 @@ class RemadeLog {
     }
   }
   void Put(std::string_view channel, int64_t utime, std::span<const uint8_t> data) {
-    record_.clear();
-    PutBigEndian(kRecordMagic, 4, &record_);
-    PutBigEndian(static_cast<uint64_t>(sums_.events()), 8, &record_);
-    PutBigEndian(static_cast<uint64_t>(utime), 8, &record_);
-    PutBigEndian(channel.size(), 4, &record_);
-    PutBigEndian(data.size(), 4, &record_);
-    record_.insert(record_.end(), channel.begin(), channel.end());
-    record_.insert(record_.end(), data.begin(), data.end());
+    PutRecord(sums_.events(), channel, utime, data, &record_);
     sums_.Add(record_);
     sink_(record_);
     CheckBlocks();
@@ -204,7 +191,7 @@ PackedRun Describe(const std::string& path) {
   while (reader.Next(&event)) {
     const auto channel = made.find(event.channel);
     if (event.number != sums.events()) refuse("its events are not numbered one after the other");
-    const size_t size = kRecordHeader + event.channel.size() + event.data.size();
+    const size_t size = kEventLogHeader + event.channel.size() + event.data.size();
     sums.Add({reader.bytes() + event.offset, size});
     if (channel != made.end()) {
       const auto at = static_cast<size_t>(channel->second->run_id_offset) + 8;

@@ -58,10 +58,6 @@ std::string UnitOf(const Limit& limit) {
   return limit.has_unit() ? limit.unit() : UnitOfField(limit.field());
 }
 
-std::string WithUnit(const std::string& name, const std::string& unit) {
-  return unit.empty() ? name : fmt::format("{} [{}]", name, unit);
-}
-
 std::string MetricLabel(const std::string& metric) {
   const logging::Metric* const known = logging::FindMetric(metric);
   return known == nullptr ? metric : known->description;

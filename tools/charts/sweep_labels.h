@@ -19,9 +19,6 @@ bool IsSeed(const Variable& variable);
 std::string UnitOf(const Variable& variable);
 std::string UnitOf(const Limit& limit);
 
-/// "direction [°]"; "seed" without a unit.
-std::string WithUnit(const std::string& name, const std::string& unit);
-
 /// A metric's name and unit: in words; a name that this version does not know stays.
 std::string MetricLabel(const std::string& metric);
 std::string MetricUnit(const std::string& metric);

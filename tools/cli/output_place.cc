@@ -73,13 +73,12 @@ void CheckFileFree(const std::string& flag, const fs::path& file, bool force) {
 }
 
 int64_t ExpectedLogSize(const RunSpec& spec) {
-  constexpr int64_t kRecordHeader = 28;  // of LCM's event log, before the channel's name
   int64_t tick = 0;
   for (const Channel& channel : spec.graph().channel()) {
     const MessageType* const type = FindMessageType(channel.type());
     if (channel.external() || type == nullptr) continue;
-    tick += kRecordHeader + static_cast<int64_t>(channel.name().size()) +
-            static_cast<int64_t>(type->encoded_size(CountsOf(channel)));
+    tick += static_cast<int64_t>(logging::kEventLogHeader + channel.name().size()) +
+            type->encoded_size(CountsOf(channel));
   }
   const double channels = static_cast<double>(tick) * static_cast<double>(spec.num_ticks());
   return spec.num_ticks() == 0 ? 0 : kRunInfo + static_cast<int64_t>(kBesides * channels);
