@@ -6,6 +6,7 @@
 #include <concepts>
 #include <cstdint>
 #include <cstring>
+#include <iterator>
 #include <span>
 #include <string>
 #include <string_view>
@@ -189,6 +190,19 @@ template <class T>
 bool DecodeChecked(const uint8_t* data, int64_t size, T* message) {
   return size <= INT32_MAX && MessageTraits<T>::WellFormedSize(data, size) == size &&
          message->decode(data, 0, static_cast<int>(size)) == size;
+}
+
+template <class T>
+bool DecodeChecked(std::span<const uint8_t> data, T* message) {
+  return DecodeChecked(data.data(), std::ssize(data), message);
+}
+
+/// The message as it is sent. Allocates.
+template <class T>
+std::vector<uint8_t> MessageBytes(const T& message) {
+  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  return bytes;
 }
 
 /// What is known of T at run time.

@@ -74,9 +74,7 @@ CutResult CutLog(const std::string& from, const CutRange& range, const std::stri
   LogReader reader(from);
   PartialFile file(to);
   EventLogWriter writer(file.part());
-  std::vector<uint8_t> bytes(static_cast<size_t>(info.getEncodedSize()));
-  info.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  writer.Write(kRunInfoChannel, 0, bytes);
+  writer.Write(kRunInfoChannel, 0, MessageBytes(info));
   CutResult result{0, spec.cut().first_tick(), spec.cut().last_tick(), 0};
   const int64_t first_utime = MakeTick(result.first_tick, spec.tick_period()).utime;
   const int64_t last_utime = MakeTick(result.last_tick, spec.tick_period()).utime;

@@ -59,7 +59,7 @@ run_info_t ReadRunInfo(LogReader* reader, const std::string& path, RunSpec* spec
   LogEvent event;
   run_info_t info;
   if (!reader->Next(&event) || event.channel != kRunInfoChannel ||
-      !DecodeChecked(event.data.data(), static_cast<int64_t>(event.data.size()), &info)) {
+      !DecodeChecked(event.data, &info)) {
     throw LogError(fmt::format(
         "{}: does not begin with RUN_INFO; is it the log of a Poise run, and whole?", path));
   }

@@ -38,9 +38,7 @@ RunLogWriter::RunLogWriter(const std::string& path, const RunSpec& spec, const r
     }
     lanes_.push_back(std::move(lane));
   }
-  std::vector<uint8_t> bytes(static_cast<size_t>(info.getEncodedSize()));
-  info.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  log_.Write(kRunInfoChannel, 0, bytes);
+  log_.Write(kRunInfoChannel, 0, MessageBytes(info));
   Flush();
 }
 

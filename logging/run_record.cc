@@ -77,8 +77,7 @@ class Store {
  private:
   template <class T>
   static bool IsMessage(std::span<const uint8_t> data, T* message) {
-    return DecodeChecked(data.data(), static_cast<int64_t>(data.size()), message) &&
-           MessageTraits<T>::AllFinite(*message);
+    return DecodeChecked(data, message) && MessageTraits<T>::AllFinite(*message);
   }
   static bool IsReadable(const MessageType* type, std::span<const uint8_t> data) {
     return type != nullptr && AllFinite(*type, data);
@@ -98,8 +97,8 @@ std::map<std::string, Add, std::less<>> MakeAdders(const Store& store, RunRecord
 }
 
 bool IsAnswer(std::span<const uint8_t> data, int64_t run_id, operate::answer_t* answer) {
-  return DecodeChecked(data.data(), static_cast<int64_t>(data.size()), answer) &&
-         answer->run_id == run_id && MessageTraits<operate::answer_t>::AllFinite(*answer);
+  return DecodeChecked(data, answer) && answer->run_id == run_id &&
+         MessageTraits<operate::answer_t>::AllFinite(*answer);
 }
 
 /// Metrics index messages by the robot's joints and feet.
@@ -180,8 +179,8 @@ RunRecord ReadRun(const std::string& path, uint64_t most_in_memory) {
 
 std::optional<health_t> ReadHealth(const LogEvent& event, int64_t run_id) {
   health_t health;
-  if (!DecodeChecked(event.data.data(), static_cast<int64_t>(event.data.size()), &health) ||
-      health.run_id != run_id || HealthChannel(health.component) != event.channel ||
+  if (!DecodeChecked(event.data, &health) || health.run_id != run_id ||
+      HealthChannel(health.component) != event.channel ||
       !MessageTraits<health_t>::AllFinite(health)) {
     return {};
   }

@@ -83,8 +83,7 @@ struct RunRecord {
     const std::vector<uint8_t>* const data =
         found == other.end() ? nullptr : found->second.at(tick);
     T message;
-    if (data == nullptr ||
-        !DecodeChecked(data->data(), static_cast<int64_t>(data->size()), &message)) {
+    if (data == nullptr || !DecodeChecked(*data, &message)) {
       return {};
     }
     return message;

@@ -40,7 +40,7 @@ bool TickMessages::Take(std::string_view type, std::span<const uint8_t> data) {
   VisitMessages([&]<class T>(std::optional<T>& message) {
     if (type != MessageTraits<T>::kName || message) return;
     message.emplace();
-    taken = DecodeChecked(data.data(), static_cast<int64_t>(data.size()), &*message) &&
+    taken = DecodeChecked(data, &*message) &&
             (std::is_same_v<T, derived::signals_t> || MessageTraits<T>::AllFinite(*message));
     if (!taken) message.reset();
   });

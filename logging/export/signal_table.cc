@@ -174,8 +174,7 @@ class ColumnSource {
     if (events_.IsDerived(event.channel)) return LogMessages::Tick(*lane.type, event);
     if (!lane.filter) {
       health_t message;
-      if (!DecodeChecked(event.data.data(), static_cast<int64_t>(event.data.size()), &message) ||
-          message.run_id != run_.spec.run_id()) {
+      if (!DecodeChecked(event.data, &message) || message.run_id != run_.spec.run_id()) {
         return {};
       }
       return message.tick;

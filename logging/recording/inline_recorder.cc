@@ -46,9 +46,7 @@ void InlineRecorder::Close(const RunSpec& spec, const std::string& detail) {
   for (int i = 0; i < spec.graph().component_size(); ++i) {
     health_t health = FinalHealth(spec, *runner_, i);
     if (health.detail.empty()) health.detail = detail;
-    std::vector<uint8_t> bytes(static_cast<size_t>(health.getEncodedSize()));
-    health.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-    writer_.AddHealth(HealthChannel(health.component), bytes);
+    writer_.AddHealth(HealthChannel(health.component), MessageBytes(health));
   }
   writer_.Close();
 }

@@ -228,9 +228,7 @@ class ReplayedStages {
       if (log_.lanes_[c].type->name != kAnswerType) continue;
       for (const ExternalMessage& message : log_.external_[c]) {
         operate::answer_t answer;
-        if (!DecodeChecked(message.data.data(), static_cast<int64_t>(message.data.size()),
-                           &answer) ||
-            answer.component != component) {
+        if (!DecodeChecked(message.data, &answer) || answer.component != component) {
           continue;
         }
         answers.emplace(answer.id, answer);
@@ -426,9 +424,7 @@ ReplayedComponent LogReplay::Replay(const RunSpec& spec, int index,
 void LogReplay::Write(const std::string& to, const run_info_t& info,
                       const ChangedMessages& changed) const {
   EventLogWriter writer(to);
-  std::vector<uint8_t> bytes(static_cast<size_t>(info.getEncodedSize()));
-  info.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  writer.Write(kRunInfoChannel, 0, bytes);
+  writer.Write(kRunInfoChannel, 0, MessageBytes(info));
   LogReader reader(path_);
   LogEvent event;
   while (reader.Next(&event)) {

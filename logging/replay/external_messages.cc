@@ -19,7 +19,7 @@ constexpr int64_t kReach = kMaxLead + kReceiveWindow;  // ticks
 template <class T>
 std::optional<T> Decode(std::span<const uint8_t> data) {
   T message;
-  if (!DecodeChecked(data.data(), static_cast<int64_t>(data.size()), &message)) return {};
+  if (!DecodeChecked(data, &message)) return {};
   return message;
 }
 

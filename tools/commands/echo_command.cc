@@ -148,11 +148,7 @@ void CheckLive(const LiveRun& live, const EchoOptions& options, EchoOutput* outp
     throw ConfigError(fmt::format("run {}: has no channel '{}'; {}", live.spec().run_id(),
                                   options.channel, Suggest(options.channel, names)));
   }
-  const health_t health{};
-  std::vector<uint8_t> data(static_cast<size_t>(health.getEncodedSize()));
-  health.encode(data.data(), 0, static_cast<int>(data.size()));
-  const MessageType& type = *FindMessageType(health_t::getHash());
-  output->Check(type, data);
+  output->Check(*FindMessageType(health_t::getHash()), MessageBytes(health_t{}));
 }
 
 int EchoLive(const EchoOptions& options) {

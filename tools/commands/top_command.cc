@@ -49,12 +49,12 @@ class Watch {
       if (message.index < 0) return;  // health comes from the processes themselves
       bridge_status_t bridge;
       if (message.type->fingerprint == bridge_status_t::getHash() &&
-          DecodeChecked(message.data.data(), static_cast<int64_t>(message.data.size()), &bridge)) {
+          DecodeChecked(message.data, &bridge)) {
         statistics_.SetBridge(bridge);
       }
       bus_status_t bus;
       if (message.type->fingerprint == bus_status_t::getHash() &&
-          DecodeChecked(message.data.data(), static_cast<int64_t>(message.data.size()), &bus)) {
+          DecodeChecked(message.data, &bus)) {
         statistics_.SetBus(bus);
       }
       statistics_.AddMessage(message.index, message.tick, message.data.size(), last_arrival_);

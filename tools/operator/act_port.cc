@@ -60,13 +60,6 @@ int IndexOf(const std::vector<std::string>& names, const std::string& name, cons
   return static_cast<int>(found - names.begin());
 }
 
-template <class Message>
-std::vector<uint8_t> BytesOf(const Message& message) {
-  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
-}
-
 }  // namespace
 
 std::vector<LiveField> LiveFields(const RunSpec& spec) {
@@ -281,14 +274,14 @@ void ActPort::Do(OperatorAct act) {
   Start(&waiting_.back());
 }
 
-bool ActPort::Send(const act_t& message) { return Send(act_channel_, BytesOf(message)); }
+bool ActPort::Send(const act_t& message) { return Send(act_channel_, MessageBytes(message)); }
 
 bool ActPort::SendStop(bool stop, bool reset) {
   emergency_stop_t message{};
   message.run_id = spec_.run_id();
   message.stop = stop ? 1 : 0;
   message.reset = reset ? 1 : 0;
-  return Send(stop_channel_, BytesOf(message));
+  return Send(stop_channel_, MessageBytes(message));
 }
 
 void ActPort::Answer(int64_t id, int64_t tick, std::string reason) {
@@ -329,8 +322,7 @@ std::string ActPort::Reason(const OperatorAct& act, const answer_t& answer) cons
 
 int8_t ActPort::HearAnswer(std::span<const uint8_t> data) {
   answer_t answer;
-  if (!DecodeChecked(data.data(), static_cast<int64_t>(data.size()), &answer) ||
-      answer.run_id != spec_.run_id()) {
+  if (!DecodeChecked(data, &answer) || answer.run_id != spec_.run_id()) {
     return 0;
   }
   const auto found = std::ranges::find_if(waiting_, [&](const Waiting& waiting) {
@@ -346,8 +338,7 @@ int8_t ActPort::HearAnswer(std::span<const uint8_t> data) {
 
 void ActPort::HearStatus(std::span<const uint8_t> data) {
   bridge_status_t status;
-  if (!DecodeChecked(data.data(), static_cast<int64_t>(data.size()), &status) ||
-      status.run_id != spec_.run_id()) {
+  if (!DecodeChecked(data, &status) || status.run_id != spec_.run_id()) {
     return;
   }
   stopped_ = status.state >= bridge_status_t::STATE_STOPPING;

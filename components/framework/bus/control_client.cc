@@ -25,8 +25,7 @@ struct ControlClient::Links {
     control.run_id = run_id;
     control.command = command;
     control.channel = -1;
-    std::vector<uint8_t> bytes(static_cast<size_t>(control.getEncodedSize()));
-    control.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    const std::vector<uint8_t> bytes = MessageBytes(control);
     return sender && sender->Send(kControlChannel, bytes.data(), bytes.size());
   }
 };
