@@ -1,7 +1,9 @@
 #include "components/framework/configuration/field_rules.h"
 
 #include <fmt/format.h>
+#include <google/protobuf/text_format.h>
 
+#include <charconv>
 #include <cmath>
 #include <vector>
 
@@ -36,59 +38,35 @@ std::string Range(const FieldRule& rule) {
 
 const FieldRule& RuleOf(const FieldDescriptor& field) { return field.options().GetExtension(rule); }
 
-template <class Value>
-void Check(const FieldDescriptor& field, Value value, const std::string& path) {
-  if (Allows(RuleOf(field), static_cast<double>(value))) return;
+/// `text`: the value as it is written.
+void Check(const FieldDescriptor& field, double value, const std::string& text,
+           const std::string& path) {
+  if (Allows(RuleOf(field), value)) return;
   std::string range = RangeOf(field);
-  const bool finite = std::isfinite(static_cast<double>(value));
-  if (!finite) range = range.empty() ? "finite" : "finite and " + range;
-  throw ConfigError(path, fmt::format("is {}; must be {}", value, range));
+  if (!std::isfinite(value)) range = range.empty() ? "finite" : "finite and " + range;
+  throw ConfigError(path, fmt::format("is {}; must be {}", text, range));
 }
 
 /// Checks the element `i` of a list, or a single value where `i` is −1.
 void CheckValue(const Message& message, const FieldDescriptor& field, int i,
                 const std::string& path) {
   const Reflection& values = *message.GetReflection();
-  const bool one = i < 0;
   switch (field.cpp_type()) {
-    case FieldDescriptor::CPPTYPE_DOUBLE:
-      return Check(
-          field,
-          one ? values.GetDouble(message, &field) : values.GetRepeatedDouble(message, &field, i),
-          path);
-    case FieldDescriptor::CPPTYPE_FLOAT:
-      return Check(
-          field,
-          one ? values.GetFloat(message, &field) : values.GetRepeatedFloat(message, &field, i),
-          path);
-    case FieldDescriptor::CPPTYPE_INT32:
-      return Check(
-          field,
-          one ? values.GetInt32(message, &field) : values.GetRepeatedInt32(message, &field, i),
-          path);
-    case FieldDescriptor::CPPTYPE_INT64:
-      return Check(
-          field,
-          one ? values.GetInt64(message, &field) : values.GetRepeatedInt64(message, &field, i),
-          path);
-    case FieldDescriptor::CPPTYPE_UINT32:
-      return Check(
-          field,
-          one ? values.GetUInt32(message, &field) : values.GetRepeatedUInt32(message, &field, i),
-          path);
-    case FieldDescriptor::CPPTYPE_UINT64:
-      return Check(
-          field,
-          one ? values.GetUInt64(message, &field) : values.GetRepeatedUInt64(message, &field, i),
-          path);
     case FieldDescriptor::CPPTYPE_MESSAGE:
-      return CheckFields(
-          one ? values.GetMessage(message, &field) : values.GetRepeatedMessage(message, &field, i),
-          path + ".");
+      return CheckFields(i < 0 ? values.GetMessage(message, &field)
+                               : values.GetRepeatedMessage(message, &field, i),
+                         path + ".");
     case FieldDescriptor::CPPTYPE_BOOL:
     case FieldDescriptor::CPPTYPE_ENUM:
     case FieldDescriptor::CPPTYPE_STRING:
-      break;
+      return;
+    default: {
+      std::string text;
+      google::protobuf::TextFormat::PrintFieldValueToString(message, &field, i, &text);
+      double value = 0;
+      std::from_chars(text.data(), text.data() + text.size(), value);
+      return Check(field, value, text, path);
+    }
   }
 }
 
