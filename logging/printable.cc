@@ -26,6 +26,13 @@ std::string Printable(std::string_view text, std::string_view quote) {
   return escaped;
 }
 
+std::string CsvCell(std::string_view text) {
+  if (text.find_first_of(",\"\r\n") == std::string_view::npos) return std::string(text);
+  std::string quoted = "\"";
+  for (const char c : text) quoted.append(c == '"' ? 2 : 1, c);
+  return quoted + '"';
+}
+
 bool IsUtf8(std::string_view text) {
   try {
     nlohmann::json(text).dump();  // strict: throws for what is no UTF-8

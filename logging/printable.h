@@ -15,6 +15,9 @@ std::string ForTerminal(std::string_view text);
 /// ForTerminal of each line by itself.
 std::string LinesForTerminal(std::string_view text);
 
+/// `text` as a cell of a CSV file (RFC 4180): in quotes where it must be.
+std::string CsvCell(std::string_view text);
+
 bool IsUtf8(std::string_view text);
 /// True for UTF-8 without control characters.
 bool IsPlainUtf8(std::string_view text);

@@ -19,6 +19,7 @@
 #include "logging/log_messages.h"
 #include "logging/paged_file.h"
 #include "logging/partial_file.h"
+#include "logging/printable.h"
 
 namespace poise::logging {
 namespace {
@@ -28,17 +29,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr char kUnitsFile[] = "columns.json";
 constexpr size_t kMostChannels = 64;  // of a table whose graph is not known: damage makes up names
-
-/// A field of a row; in quotes when a separator stands in it.
-void AppendText(std::string_view text, std::string* row) {
-  if (text.find_first_of(",\"\r\n") == std::string_view::npos) {
-    row->append(text);
-    return;
-  }
-  row->push_back('"');
-  for (const char c : text) row->append(c == '"' ? 2 : 1, c);
-  row->push_back('"');
-}
 
 /// How many scalars stand before a message's own: counts and header.
 size_t HeaderScalars(const MessageType& type) { return type.count_names.size() + 3; }
@@ -55,7 +45,7 @@ class Row final : public ScalarVisitor {
     if (Begin() && !std::isnan(value)) fmt::format_to(std::back_inserter(*to_), "{}", value);
   }
   void Text(std::string_view, std::string_view value) override {
-    if (Begin()) AppendText(value, to_);
+    if (Begin()) *to_ += CsvCell(value);
   }
 
  private:

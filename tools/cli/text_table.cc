@@ -5,7 +5,6 @@
 #include <numeric>
 
 #include "fmt/format.h"
-#include "logging/printable.h"
 
 namespace poise {
 namespace {
@@ -150,13 +149,6 @@ std::string FormatColumns(std::vector<TableRow> rows, int width) {
     text += Block(rows, columns, Fit(widths, columns, width));
   }
   return text;
-}
-
-std::string CsvCell(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted.append(c == '"' ? 2 : 1, c);
-  return quoted + '"';
 }
 
 // Not fmt::join, which GCC 12 misreads here.

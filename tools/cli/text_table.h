@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "fmt/format.h"
+#include "logging/printable.h"
 #include "tools/cli/output_style.h"
 
 namespace poise {
@@ -33,9 +34,8 @@ using TableRow = std::vector<TableCell>;
 /// no printable text is escaped.
 std::string FormatColumns(std::vector<TableRow> rows, int width = ScreenStyle().columns);
 
-/// `text` as a cell of a CSV file (RFC 4180): in quotes where it must be.
-std::string CsvCell(const std::string& text);
-/// A number as such a cell; empty without one.
+using logging::CsvCell;
+/// A number as a cell of a CSV file; empty without one.
 template <class Number>
 std::string CsvNumber(const std::optional<Number>& value) {
   return value ? fmt::format("{}", *value) : "";

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "fmt/format.h"
+#include "tools/robot_import/robot_fields.h"
 
 namespace poise {
 namespace {
@@ -96,8 +97,7 @@ const char* SurenessName(Sureness sureness) {
 }
 
 int SideOfName(const std::string& name) {
-  std::string lower;
-  for (const char c : name) lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string lower = Lower(name);
   const auto has = [&](const char* word) { return lower.find(word) != std::string::npos; };
   if (has("left") != has("right")) return has("left") ? 1 : -1;
   // A letter that stands alone between separators, or a capital before a word: L_Foot, leg_l,

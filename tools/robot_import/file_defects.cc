@@ -1,6 +1,7 @@
 #include "tools/robot_import/file_defects.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
@@ -15,6 +16,7 @@
 #include "tools/robot_import/anatomy.h"
 #include "tools/robot_import/inertia_repair.h"
 #include "tools/robot_import/motor_guess.h"
+#include "tools/robot_import/robot_fields.h"
 
 namespace poise {
 namespace {
@@ -51,12 +53,8 @@ bool IsPoint(const MassProperties& mass) {
 
 /// Fingers and grippers: they carry nothing, and their motors hold nothing.
 bool IsFinger(const std::string& name) {
-  std::string lower;
-  for (const char c : name) lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  for (const char* word : {"finger", "gripper", "thumb", "index", "pinky", "knuckle"}) {
-    if (lower.find(word) != std::string::npos) return true;
-  }
-  return false;
+  return std::ranges::any_of(std::array{"finger", "gripper", "thumb", "index", "pinky", "knuckle"},
+                             [&](const char* word) { return Contains(name, word); });
 }
 
 class Repairer {
@@ -244,13 +242,8 @@ class Repairer {
   }
 
   bool IsLeg(const std::string& name) const {
-    std::string lower;
-    for (const char c : name)
-      lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    for (const char* word : {"hip", "knee", "ankle", "leg"}) {
-      if (lower.find(word) != std::string::npos) return true;
-    }
-    return false;
+    return std::ranges::any_of(std::array{"hip", "knee", "ankle", "leg"},
+                               [&](const char* word) { return Contains(name, word); });
   }
 
   const SourceJoint* JointOf(const std::string& link) const {
@@ -542,10 +535,7 @@ class Repairer {
 
   static bool SameBesideSide(const std::string& a, const std::string& b) {
     const auto neutral = [](const std::string& name) {
-      std::string lower;
-      for (const char c : name) {
-        lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-      }
+      std::string lower = Lower(name);
       for (const char* word : {"right", "left"}) {
         if (const size_t at = lower.find(word); at != std::string::npos) {
           return lower.replace(at, std::string(word).size(), "*");
