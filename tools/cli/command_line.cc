@@ -137,6 +137,11 @@ void SetExample(CLI::App* command, const std::string& example) {
       example);
 }
 
+CLI::Option* AddList(CLI::App* command, const char* flag, std::vector<std::string>* to,
+                     const char* text, const char* type) {
+  return command->add_option(flag, *to, text)->type_name(type)->allow_extra_args(false)->take_all();
+}
+
 std::string HelpText(const CLI::App& app) {
   const int width = ScreenStyle().columns;
   std::string text;

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace poise {
 
@@ -13,6 +14,11 @@ std::shared_ptr<CLI::FormatterBase> MakeHelpFormatter();
 
 /// The footer of a command that says nothing else there: exit codes, and an example of its use.
 void SetExample(CLI::App* command, const std::string& example);
+
+/// An option that may be given again and again, one value each time. `type`: what the help calls
+/// it.
+CLI::Option* AddList(CLI::App* command, const char* flag, std::vector<std::string>* to,
+                     const char* text, const char* type = "TEXT");
 
 /// The help of the command that was asked about, in the terminal's width.
 std::string HelpText(const CLI::App& app);

@@ -13,6 +13,7 @@
 #include "fmt/format.h"
 #include "tools/benchmark/benchmark_folder.h"
 #include "tools/charts/sweep_output.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/shell_word.h"
 #include "tools/cli/temporary_dir.h"
@@ -184,22 +185,17 @@ void AddBenchmarkCommand(CLI::App* app, Command* command) {
       "--controller", subject->controller,
       "a scenario's .pbtxt file with nothing but `graph` and the fields of its components");
   benchmark->add_option("--variant", subject->variant, "of the controller's file");
-  const auto list = [&](const char* flag, std::vector<std::string>* to, const char* text,
-                        const char* type) {
-    return benchmark->add_option(flag, *to, text)
-        ->type_name(type)
-        ->allow_extra_args(false)
-        ->take_all();
-  };
-  list("--set", &subject->set, "change a field of a component (poise list fields)", "FIELD=VALUE");
-  list("--without", &subject->without, "leave out a part of Poise's controller", "PART")
+  AddList(benchmark, "--set", &subject->set, "change a field of a component (poise list fields)",
+          "FIELD=VALUE");
+  AddList(benchmark, "--without", &subject->without, "leave out a part of Poise's controller",
+          "PART")
       ->check(CLI::IsMember(RemovableParts()));
   benchmark
       ->add_option("--drives", subject->drives,
                    "emulated drives between bridge and robot, as of poise run; runs as processes")
       ->check(CLI::IsMember(EmulatedDrives()))
       ->excludes(graph);
-  list("--part", &arguments->parts, "only this part of the set, repeatable", "PART");
+  AddList(benchmark, "--part", &arguments->parts, "only this part of the set, repeatable", "PART");
   benchmark->add_flag("--quick", arguments->quick,
                       "a few of the same points: minutes; --resume without it goes on to all");
   benchmark->add_option("--out", session->out,

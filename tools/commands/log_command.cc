@@ -319,11 +319,9 @@ void AddCut(CLI::App* log, Command* command) {
   const CLI::Range ticks(int64_t{0}, INT64_MAX - 1);
   cut->add_option("--first-tick", options->first_tick, "first tick")->check(ticks)->excludes(from);
   cut->add_option("--last-tick", options->last_tick, "last tick")->check(ticks)->excludes(to);
-  cut->add_option("--channel", options->channels,
-                  "channel to keep, e.g. --channel ROBOT_STATE --channel HEALTH_SIM; default: "
-                  "all")
-      ->allow_extra_args(false)
-      ->take_all();
+  AddList(cut, "--channel", &options->channels,
+          "channel to keep, e.g. --channel ROBOT_STATE --channel HEALTH_SIM; default: "
+          "all");
   SetExample(cut, "poise log cut runs/latest --from 1 --to 1.2 --out part.lcm");
   cut->callback([options, command] { *command = [options] { return Cut(*options); }; });
 }

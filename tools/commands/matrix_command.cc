@@ -11,6 +11,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "tools/cli/child_process.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/output_style.h"
 #include "tools/cli/progress.h"
@@ -259,12 +260,9 @@ void AddMatrixCommand(CLI::App* app, Command* command) {
       ->add_option("scenario", options->scenarios,
                    "names or .pbtxt files; all: every experiment of the paper")
       ->capture_default_str();
-  matrix
-      ->add_option("--ablation", options->ablations,
-                   "column to run, repeatable; default: all; variants run as they are")
-      ->check(CLI::IsMember(names))
-      ->allow_extra_args(false)
-      ->take_all();
+  AddList(matrix, "--ablation", &options->ablations,
+          "column to run, repeatable; default: all; variants run as they are")
+      ->check(CLI::IsMember(names));
   matrix->add_option("--world", options->world,
                      "engine of the simulated robot: ode or mujoco; default: the scenarios'");
   matrix->add_option("--jobs", options->jobs, "runs at a time; default: the processor's cores")

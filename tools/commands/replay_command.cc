@@ -15,6 +15,7 @@
 #include "logging/printable.h"
 #include "logging/replay/component_replay.h"
 #include "logging/replay/log_player.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/progress.h"
 #include "tools/cli/signals.h"
@@ -239,20 +240,12 @@ void AddReplayCommand(CLI::App* app, Command* command) {
       "poise replay runs/latest "
       "--component task_controller --set task_controller.com.kp=200");
   replay->add_option("run", options->run, "folder of a run or a log; default: the latest run");
-  CLI::Option* component =
-      replay
-          ->add_option("--component", options->components,
-                       "component to replay, more than once for several; default: all")
-          ->allow_extra_args(false)
-          ->take_all();
-  CLI::Option* set =
-      replay
-          ->add_option("--set", options->set,
-                       "change a field of a configuration (poise list fields), e.g. --set "
-                       "task_controller.com.kp=200")
-          ->type_name("FIELD=VALUE")
-          ->allow_extra_args(false)
-          ->take_all();
+  CLI::Option* component = AddList(replay, "--component", &options->components,
+                                   "component to replay, more than once for several; default: all");
+  CLI::Option* set = AddList(replay, "--set", &options->set,
+                             "change a field of a configuration (poise list fields), e.g. --set "
+                             "task_controller.com.kp=200",
+                             "FIELD=VALUE");
   CLI::Option* out =
       replay->add_option("--out", options->out,
                          "write a run's folder of it, new or empty: the log, with what came out "

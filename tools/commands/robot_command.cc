@@ -82,12 +82,9 @@ void AddRobotCommand(CLI::App* app, Command* command) {
   check->add_flag("--json", options->json, "everything in SI units, for programs");
   check->add_option("--page", options->page, "write the robot in 3D to this file")
       ->type_name("FILE");
-  check
-      ->add_option("--meshes", options->meshes,
-                   "folder of the maker's meshes, for the page; may be repeated; default: beside "
-                   "the maker's file and above it")
-      ->allow_extra_args(false)
-      ->take_all()
+  AddList(check, "--meshes", &options->meshes,
+          "folder of the maker's meshes, for the page; may be repeated; default: beside "
+          "the maker's file and above it")
       ->check(CLI::ExistingDirectory);
   check->footer("Example: poise robot check heron/heron --page heron.html");
   check->callback([options, command] { *command = [options] { return CheckOneRobot(*options); }; });

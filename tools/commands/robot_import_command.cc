@@ -4,6 +4,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "tools/cli/cli_checks.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/output_style.h"
 #include "tools/cli/shell_word.h"
@@ -127,17 +128,13 @@ void AddRobotImport(CLI::App* robot, Command* command) {
       ->expected(2)
       ->type_name("LENGTH WIDTH")
       ->check(Within("in (0, 2] m", [](double m) { return m > 0 && m <= 2; }));
-  app->add_option("--meshes", arguments->meshes,
-                  "folder of the maker's meshes; may be repeated; default: beside the file and "
-                  "above it")
-      ->allow_extra_args(false)
-      ->take_all()
+  AddList(app, "--meshes", &arguments->meshes,
+          "folder of the maker's meshes; may be repeated; default: beside the file and "
+          "above it")
       ->check(CLI::ExistingDirectory);
   app->add_option("--imu", options->imu, "link or site that carries it");
   app->add_option("--body", options->body, "link whose orientation is controlled");
-  app->add_option("--lock", options->lock, "a joint that is to stand still; may be repeated")
-      ->allow_extra_args(false)
-      ->take_all();
+  AddList(app, "--lock", &options->lock, "a joint that is to stand still; may be repeated");
   app->add_flag("--force", arguments->force, "replace a text that is there");
   app->callback([arguments, command] { *command = [arguments] { return ImportIt(*arguments); }; });
 }

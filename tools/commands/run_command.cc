@@ -3,6 +3,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "tools/cli/cli_checks.h"
+#include "tools/cli/command_line.h"
 #include "tools/commands/commands.h"
 #include "tools/live/interactive_run.h"
 #include "tools/run/inline_run.h"
@@ -84,11 +85,8 @@ void AddRunCommand(CLI::App* app, Command* command) {
                 "its messages in memory, and sends them to all others as ever")
       ->excludes(in_process)
       ->excludes(interactive);
-  run->add_option("--host", options->changes.host,
-                  "put these components of the graph into one process of that name")
-      ->type_name("PROCESS=A,B,...")
-      ->allow_extra_args(false)
-      ->take_all()
+  AddList(run, "--host", &options->changes.host,
+          "put these components of the graph into one process of that name", "PROCESS=A,B,...")
       ->excludes(in_process)
       ->excludes(interactive);
   CLI::Option* const realtime = run->add_flag("--realtime", options->changes.realtime,
@@ -143,10 +141,8 @@ void AddRunCommand(CLI::App* app, Command* command) {
       ->excludes(in_process);
   run->add_option("--variant", options->changes.variant,
                   "run this variant of the scenario (poise list scenarios)");
-  run->add_option("--without", options->changes.without, "leave out a part of the controller")
-      ->check(CLI::IsMember(RemovableParts()))
-      ->allow_extra_args(false)
-      ->take_all();
+  AddList(run, "--without", &options->changes.without, "leave out a part of the controller")
+      ->check(CLI::IsMember(RemovableParts()));
   run->add_flag("--ideal", options->changes.ideal,
                 "a robot without joint friction, sensor noise, drive train and model error");
   run->add_flag("--no-reference", arguments->no_reference,
@@ -156,13 +152,11 @@ void AddRunCommand(CLI::App* app, Command* command) {
                   "scenario's");
   run->add_option("--world", options->changes.world,
                   "engine of the simulated robot: ode or mujoco; default: the scenario's");
-  run->add_option("--set", options->changes.set,
-                  "change a field of the scenario, e.g. --set sim.push[0].peak=120 or "
-                  "--set 'check[push_peak].at_most=200' (poise list fields); "
-                  "no value: empties a list or group, unsets a number without default")
-      ->type_name("FIELD=VALUE")
-      ->allow_extra_args(false)
-      ->take_all();
+  AddList(run, "--set", &options->changes.set,
+          "change a field of the scenario, e.g. --set sim.push[0].peak=120 or "
+          "--set 'check[push_peak].at_most=200' (poise list fields); "
+          "no value: empties a list or group, unsets a number without default",
+          "FIELD=VALUE");
   run->add_option("--duration", options->changes.duration, "simulated time, s");
   run->add_option("--seed", options->changes.seed, "of all noise")->check(Whole());
   run->add_option("--drop", options->changes.drop_rate,

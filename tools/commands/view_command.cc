@@ -188,10 +188,8 @@ void AddViewCommand(CLI::App* app, Command* command) {
   view->add_option("--foxglove", options->foxglove,
                    "serve Foxglove's WebSocket on this port of 127.0.0.1 as well; its own is 8765")
       ->check(CLI::Range(1, 65535));
-  view->add_option("--foxglove-origin", options->foxglove_origins,
-                   "origin of further pages that may connect there, e.g. https://viewer.example")
-      ->allow_extra_args(false)
-      ->take_all();
+  AddList(view, "--foxglove-origin", &options->foxglove_origins,
+          "origin of further pages that may connect there, e.g. https://viewer.example");
   view->add_flag("--control", options->control,
                  "pages with the token of the printed address may push, change settings and stop");
   SetExample(view, "poise view --control");

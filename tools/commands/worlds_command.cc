@@ -10,6 +10,7 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
 #include "tools/report/wrench_difference.h"
@@ -320,18 +321,12 @@ void AddWorldsCommand(CLI::App* app, Command* command) {
                    "paper")
       ->capture_default_str();
   worlds->add_option("--variant", options->changes.variant, "of the scenario");
-  worlds->add_option("--without", options->changes.without, "leave out a part of the controller")
-      ->check(CLI::IsMember(RemovableParts()))
-      ->allow_extra_args(false)
-      ->take_all();
+  AddList(worlds, "--without", &options->changes.without, "leave out a part of the controller")
+      ->check(CLI::IsMember(RemovableParts()));
   worlds->add_flag("--ideal", options->changes.ideal,
                    "a robot without joint friction, sensor noise, drive train and model error");
-  worlds
-      ->add_option("--set", options->changes.set,
-                   "change a field of the scenario in every engine (poise list fields)")
-      ->type_name("FIELD=VALUE")
-      ->allow_extra_args(false)
-      ->take_all();
+  AddList(worlds, "--set", &options->changes.set,
+          "change a field of the scenario in every engine (poise list fields)", "FIELD=VALUE");
   worlds->add_option("--duration", options->changes.duration, "simulated time, s");
   worlds->add_option("--out", arguments->out,
                      "folder for a run's folder each and worlds.csv; default: a dated one under "

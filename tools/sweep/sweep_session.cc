@@ -16,6 +16,7 @@
 #include "fmt/format.h"
 #include "logging/printable.h"
 #include "tools/cli/cli_checks.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/progress.h"
 #include "tools/cli/signals.h"
@@ -92,30 +93,27 @@ std::string Duration(double seconds) {
 void AddSweepOptions(CLI::App* app, SweepArguments* arguments, SessionOptions* session) {
   RunChanges* const changes = &arguments->changes;
   session->jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  const auto list = [&](const char* flag, std::vector<std::string>* to, const char* text,
-                        const char* type) {
-    return app->add_option(flag, *to, text)->type_name(type)->allow_extra_args(false)->take_all();
-  };
   // It is not marked as required: CLI11 would take a subcommand's name for it.
   app->add_option("sweep", arguments->what,
                   "name of deploy/sweeps, or a .pbtxt file; or a scenario with --vary");
-  list("--vary", &arguments->vary,
-       "a field of the scenario, or a name for --expression, and its values: FROM:TO:STEPS, then "
-       ":log, :angle (degrees), :whole; or VALUE,VALUE,...; with --random FROM:TO",
-       "NAME=VALUES");
-  list("--expression", &arguments->expression,
-       "a field that follows from the variables, e.g. "
-       "'sim.push[0].direction_x=cos(direction*deg)'",
-       "FIELD=EXPRESSION");
+  AddList(
+      app, "--vary", &arguments->vary,
+      "a field of the scenario, or a name for --expression, and its values: FROM:TO:STEPS, then "
+      ":log, :angle (degrees), :whole; or VALUE,VALUE,...; with --random FROM:TO",
+      "NAME=VALUES");
+  AddList(app, "--expression", &arguments->expression,
+          "a field that follows from the variables, e.g. "
+          "'sim.push[0].direction_x=cos(direction*deg)'",
+          "FIELD=EXPRESSION");
   app->add_option("--random", arguments->random,
                   "this many runs with every variable drawn at random, in place of the grid");
   app->add_option("--seed", arguments->seed, "of what is drawn at random")->check(Whole());
-  list("--column", &arguments->column,
-       "metric of the table (poise list metrics), repeatable, or all; default: those of the "
-       "scenario's checks",
-       "METRIC");
+  AddList(app, "--column", &arguments->column,
+          "metric of the table (poise list metrics), repeatable, or all; default: those of the "
+          "scenario's checks",
+          "METRIC");
   app->add_option("--variant", changes->variant, "of the scenario");
-  list("--without", &changes->without, "leave out a part of the controller", "PART")
+  AddList(app, "--without", &changes->without, "leave out a part of the controller", "PART")
       ->check(CLI::IsMember(RemovableParts()));
   app->add_flag("--ideal", changes->ideal,
                 "a robot without joint friction, sensor noise, drive train and model error");
@@ -124,8 +122,8 @@ void AddSweepOptions(CLI::App* app, SweepArguments* arguments, SessionOptions* s
   app->add_option("--drives", changes->drives,
                   "emulated drives between bridge and robot, as of poise run; runs as processes")
       ->check(CLI::IsMember(EmulatedDrives()));
-  list("--set", &changes->set, "change a field of the scenario in every run (poise list fields)",
-       "FIELD=VALUE");
+  AddList(app, "--set", &changes->set,
+          "change a field of the scenario in every run (poise list fields)", "FIELD=VALUE");
   app->add_option("--duration", changes->duration, "simulated time of a run, s");
   app->add_option("--out", session->out, "folder of the results; default: a dated one under runs/");
   app->add_option("--jobs", session->jobs, "runs at a time; default: the processor's cores")
