@@ -1,6 +1,7 @@
 #include "tools/foxglove/scene_parts.h"
 
 #include <algorithm>
+#include <string>
 
 namespace poise {
 namespace {
