@@ -1,6 +1,7 @@
 #include "tools/cli/signals.h"
 
 #include <csignal>
+#include <initializer_list>
 
 namespace poise {
 namespace {

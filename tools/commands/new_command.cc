@@ -14,6 +14,7 @@
 #include "tools/cli/output_place.h"
 #include "tools/commands/commands.h"
 #include "tools/scenario/new_scenario.h"
+#include "tools/scenario/run_setup.h"
 
 namespace poise {
 namespace {
