@@ -8,7 +8,6 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
-#include <vector>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/run.h"
@@ -63,6 +62,15 @@ void CheckFolderFree(const std::string& flag, const fs::path& folder, bool force
   throw ConfigError(
       fmt::format("{} {}: {}; choose another folder, or replace what is there with --force", flag,
                   folder.string(), Holdings(folder)));
+}
+
+fs::path MakeOutFolder(const std::string& out) {
+  const fs::path folder = fs::absolute(out);
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (!error && fs::is_directory(folder)) return folder;
+  throw ConfigError(fmt::format("--out {}: cannot be made: {}", out,
+                                error ? error.message() : "there is a file of that name"));
 }
 
 void CheckFileFree(const std::string& flag, const fs::path& file, bool force) {

@@ -15,6 +15,9 @@ namespace poise {
 /// ("--out"). Throws ConfigError.
 void CheckFolderFree(const std::string& flag, const std::filesystem::path& folder, bool force);
 
+/// Makes the folder of --out where it is not there; its absolute path. Throws ConfigError.
+std::filesystem::path MakeOutFolder(const std::string& out);
+
 /// CheckFolderFree for a file; a device or a pipe is always free. Logs are left to who writes:
 /// nothing replaces one (PartialFile).
 void CheckFileFree(const std::string& flag, const std::filesystem::path& file, bool force);

@@ -64,13 +64,8 @@ void CheckParts(const Benchmark& benchmark, const std::vector<std::string>& want
 fs::path MakeFolder(const BenchmarkArguments& arguments, const std::string& name) {
   const SessionOptions& session = arguments.session;
   if (session.out.empty()) return MakeRunDir("", "benchmark-" + name, false).path();
-  const fs::path folder = fs::absolute(session.out);
   if (!session.resume) CheckFolderFree("--out", session.out, session.force);
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error || !fs::is_directory(folder)) {
-    throw ConfigError(fmt::format("--out {}: cannot be made", session.out));
-  }
+  const fs::path folder = MakeOutFolder(session.out);
   if (session.force && !session.resume) {
     for (const char* old :
          {"parts", "set", kBenchmarkCsv, kChartsFile, kChartsPage, kBenchmarkJson}) {

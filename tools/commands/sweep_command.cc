@@ -81,12 +81,7 @@ int Merge(const MergeOptions& options) {
     for (const auto& [key, row] : results->rows) AddRow(row, source, &merged->rows);
   }
   if (!options.partial) CheckComplete(merged->header, merged->rows);
-  const fs::path out = fs::absolute(options.out);
-  std::error_code error;
-  fs::create_directories(out, error);
-  if (error || !fs::is_directory(out)) {
-    throw ConfigError(fmt::format("--out {}: cannot be made", options.out));
-  }
+  const fs::path out = MakeOutFolder(options.out);
   const RunDir dir(out);
   CheckFolderFree("--out", options.out, options.force);
   {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
 #include "components/framework/bus/run_socket.h"
 #include "components/framework/graph.pb.h"

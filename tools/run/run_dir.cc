@@ -99,12 +99,7 @@ RunDir::~RunDir() {
 RunDir MakeRunDir(const std::string& out, const std::string& name, bool force) {
   std::error_code error;
   if (!out.empty()) {
-    const fs::path path = fs::absolute(out);
-    fs::create_directories(path, error);
-    if (error || !fs::is_directory(path)) {
-      throw ConfigError(fmt::format("--out {}: cannot be made: {}", out,
-                                    error ? error.message() : "there is a file of that name"));
-    }
+    const fs::path path = MakeOutFolder(out);
     RunDir dir(path);
     CheckFolderFree("--out", out, force);
     for (const char* file : kFiles) {

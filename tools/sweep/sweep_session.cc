@@ -54,13 +54,7 @@ RunDir MakeSweepDir(const SessionOptions& options, const std::string& kind,
                     const std::string& name) {
   const std::string& out = options.out;
   if (out.empty()) return MakeRunDir("", kind + "-" + name, false);
-  const fs::path path = fs::absolute(out);
-  std::error_code error;
-  fs::create_directories(path, error);
-  if (error || !fs::is_directory(path)) {
-    throw ConfigError(fmt::format("--out {}: cannot be made: {}", out,
-                                  error ? error.message() : "there is a file of that name"));
-  }
+  const fs::path path = MakeOutFolder(out);
   // Results are refused with a word of --resume.
   if (!options.resume && !fs::exists(path / kResultsFile)) {
     CheckFolderFree("--out", out, options.force);
