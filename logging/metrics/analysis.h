@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <functional>
 #include <optional>
+#include <type_traits>
 
 #include "components/balance/convex_polygon.h"
 #include "logging/derived/definitions.h"
@@ -23,6 +24,34 @@ Answer RootMeanSquare(const RunRecord& run, const std::function<Answer(int64_t t
 /// Number of ticks for which `holds` is true; empty when it is empty for all.
 Answer CountTicks(const RunRecord& run,
                   const std::function<std::optional<bool>(int64_t tick)>& holds);
+
+template <class R>
+struct AsOptional {
+  using Type = std::optional<R>;
+};
+template <class R>
+struct AsOptional<std::optional<R>> {
+  using Type = std::optional<R>;
+};
+/// By tick, what `of` tells of the message; nothing where the series has none.
+template <class T, class F>
+auto OfTick(const Series<T>& series, F of) {
+  using Told = typename AsOptional<std::invoke_result_t<F, const T&>>::Type;
+  return [&series, of](int64_t tick) -> Told {
+    const T* const message = series.at(tick);
+    return message != nullptr ? Told(of(*message)) : Told();
+  };
+}
+/// OfTick of two series' messages.
+template <class T, class U, class F>
+auto OfTick(const Series<T>& series, const Series<U>& other, F of) {
+  using Told = typename AsOptional<std::invoke_result_t<F, const T&, const U&>>::Type;
+  return [&series, &other, of](int64_t tick) -> Told {
+    const T* const message = series.at(tick);
+    const U* const beside = other.at(tick);
+    return message != nullptr && beside != nullptr ? Told(of(*message, *beside)) : Told();
+  };
+}
 
 /// Balancing, section 5: on at a tick when the CoP is controlled along x or y.
 struct BalancingIntervals {

@@ -76,11 +76,8 @@ void AddCop(MetricList* list) {
 }
 
 std::vector<Interval> StepNeeded(const RunRecord& run) {
-  return Intervals(run, [&](int64_t tick) -> std::optional<bool> {
-    const planner_status_t* planner = run.planner.at(tick);
-    if (planner == nullptr) return {};
-    return planner->step_needed != 0;
-  });
+  return Intervals(
+      run, OfTick(run.planner, [](const planner_status_t& p) { return p.step_needed != 0; }));
 }
 
 /// s from the last begin of "step needed" to the fall, 0 when a fall was not announced.
@@ -99,13 +96,10 @@ void AddCapturePoint(MetricList* list) {
   list->push_back({"capture_margin_min", "mm",
                    "capture point inside the soles' hull (negative: outside), smallest",
                    [](const RunRecord& run) {
-                     return Scaled(Minimum(run,
-                                           [&](int64_t t) -> Answer {
-                                             const planner_status_t* planner = run.planner.at(t);
-                                             if (planner == nullptr) return {};
-                                             return planner->capture_margin;
-                                           }),
-                                   kMilli);
+                     const auto margin = OfTick(run.planner, [](const planner_status_t& planner) {
+                       return planner.capture_margin;
+                     });
+                     return Scaled(Minimum(run, margin), kMilli);
                    }});
   list->push_back({"step_needed_first", "s", "first said that a step is needed",
                    [](const RunRecord& run) -> Answer {

@@ -13,12 +13,10 @@ void AddErrors(MetricList* list) {
   const auto add = [&](const char* name, const char* unit, const char* text,
                        double EstimatorError::*field) {
     const auto value = [field](const RunRecord& run) {
-      return [&run, field](int64_t t) -> Answer {
-        const robot_state_t* state = run.state.at(t);
-        const ground_truth_t* truth = run.truth.at(t);
-        if (state == nullptr || truth == nullptr) return {};
-        return BaseError(*state, *truth).*field;
-      };
+      return OfTick(run.state, run.truth,
+                    [field](const robot_state_t& state, const ground_truth_t& truth) {
+                      return BaseError(state, truth).*field;
+                    });
     };
     Add(list, fmt::format("{}_max", name), unit,
         fmt::format("estimate less truth of the base's {}, largest", text),

@@ -14,17 +14,24 @@ Answer Absolute(Answer value) {
   return value;
 }
 
+/// mm, largest distance of the COM that `series` tells of from its reference.
+template <class T>
+Answer LargestComError(const RunRecord& run, const Series<T>& series, int axis) {
+  const auto error =
+      OfTick(run.plan, series, [axis](const support_plan_t& plan, const T& message) -> Answer {
+        return Absolute(ComError(plan, message.com_position, axis));
+      });
+  return Scaled(Maximum(run, error), kMilli);
+}
+
 Answer ComMotion(const RunRecord& run) {
   std::optional<Eigen::Vector3d> start;
-  return Scaled(Maximum(run,
-                        [&](int64_t t) -> Answer {
-                          const ground_truth_t* truth = run.truth.at(t);
-                          if (truth == nullptr) return {};
-                          const Eigen::Vector3d com = GetVector3(truth->com_position);
-                          if (!start) start = com;
-                          return (com - *start).norm();
-                        }),
-                kMilli);
+  const auto motion = OfTick(run.truth, [&](const ground_truth_t& truth) {
+    const Eigen::Vector3d com = GetVector3(truth.com_position);
+    if (!start) start = com;
+    return (com - *start).norm();
+  });
+  return Scaled(Maximum(run, motion), kMilli);
 }
 
 Answer ComDifference(const RunRecord& run) {
@@ -88,31 +95,13 @@ void AddMotion(MetricList* list) {
     list->push_back(
         {fmt::format("com_error_max_{}", kAxis[axis]), "mm",
          fmt::format("largest distance of the estimated COM from its reference, {}", kAxis[axis]),
-         [axis](const RunRecord& run) {
-           return Scaled(Maximum(run,
-                                 [&](int64_t t) -> Answer {
-                                   const support_plan_t* plan = run.plan.at(t);
-                                   const planner_status_t* planner = run.planner.at(t);
-                                   if (plan == nullptr || planner == nullptr) return {};
-                                   return Absolute(ComError(*plan, planner->com_position, axis));
-                                 }),
-                         kMilli);
-         }});
+         [axis](const RunRecord& run) { return LargestComError(run, run.planner, axis); }});
   }
   for (int axis = 0; axis < 3; ++axis) {
     list->push_back(
         {fmt::format("com_error_true_max_{}", kAxis[axis]), "mm",
          fmt::format("largest distance of the true COM from its reference, {}", kAxis[axis]),
-         [axis](const RunRecord& run) {
-           return Scaled(Maximum(run,
-                                 [&](int64_t t) -> Answer {
-                                   const support_plan_t* plan = run.plan.at(t);
-                                   const ground_truth_t* truth = run.truth.at(t);
-                                   if (plan == nullptr || truth == nullptr) return {};
-                                   return Absolute(ComError(*plan, truth->com_position, axis));
-                                 }),
-                         kMilli);
-         }});
+         [axis](const RunRecord& run) { return LargestComError(run, run.truth, axis); }});
   }
   list->push_back(
       {"com_error_end", "mm", "distance of the true COM from its reference at the end",
@@ -130,13 +119,10 @@ void AddMotion(MetricList* list) {
                    ModelComErrorAtEnd});
   list->push_back({"orientation_error_max", "mrad", "largest error of the body's orientation",
                    [](const RunRecord& run) {
-                     return Scaled(Maximum(run,
-                                           [&](int64_t t) -> Answer {
-                                             const task_torque_t* task = run.task.at(t);
-                                             if (task == nullptr) return {};
-                                             return GetVector3(task->body_orientation_error).norm();
-                                           }),
-                                   kMilli);
+                     const auto error = OfTick(run.task, [](const task_torque_t& task) {
+                       return GetVector3(task.body_orientation_error).norm();
+                     });
+                     return Scaled(Maximum(run, error), kMilli);
                    }});
   list->push_back({"com_motion_max", "mm",
                    "largest distance of the true COM from where it was when the window began",
@@ -162,15 +148,15 @@ void AddMotion(MetricList* list) {
                        "{}",
                        kFoot[foot], kAxis[axis]),
            [foot, axis](const RunRecord& run) {
-             return Scaled(Maximum(run,
-                                   [&](int64_t t) -> Answer {
-                                     const support_plan_t* plan = run.plan.at(t);
-                                     const planner_status_t* planner = run.planner.at(t);
-                                     if (plan == nullptr || planner == nullptr) return {};
-                                     return Absolute(FootError(*plan, *planner,
-                                                               static_cast<size_t>(foot), axis));
-                                   }),
-                           kMilli);
+             const auto error =
+                 OfTick(run.plan, run.planner,
+                        [=](const support_plan_t& plan, const planner_status_t& planner) -> Answer {
+                          const auto f = static_cast<size_t>(foot);
+                          if (plan.in_contact[f] != 0) return {};
+                          return std::abs(planner.foot_pose[f].position[axis] -
+                                          plan.foot_reference[f].position[axis]);
+                        });
+             return Scaled(Maximum(run, error), kMilli);
            }});
     }
   }

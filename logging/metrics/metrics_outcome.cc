@@ -15,42 +15,33 @@ void AddOutcome(MetricList* list) {
        [](const RunRecord& run) {
          return CountTicks(run, [&](int64_t t) { return IsDown(run, t); });
        }});
-  const auto count_all = [&](const char* name, const char* text, auto holds) {
-    list->push_back({name, "", text, [holds](const RunRecord& run) -> Answer {
+  const auto count_all = [&](const char* name, const char* text, auto series, auto holds) {
+    list->push_back({name, "", text, [series, holds](const RunRecord& run) -> Answer {
                        Answer count;
                        for (int64_t t = 0; t < run.num_ticks; ++t) {
-                         const std::optional<bool> held = holds(run, t);
-                         if (held) count = count.value_or(0) + (*held ? 1 : 0);
+                         const auto* const message = (run.*series).at(t);
+                         if (message == nullptr) continue;
+                         count = count.value_or(0) + (holds(*message) ? 1 : 0);
                        }
                        return count;
                      }});
   };
-  count_all("task_not_ok_ticks", "ticks of the whole run without a task torque",
-            [](const RunRecord& run, int64_t t) -> std::optional<bool> {
-              const task_torque_t* task = run.task.at(t);
-              if (task == nullptr) return {};
-              return task->status != task_torque_t::STATUS_OK;
-            });
+  count_all("task_not_ok_ticks", "ticks of the whole run without a task torque", &RunRecord::task,
+            [](const task_torque_t& task) { return task.status != task_torque_t::STATUS_OK; });
   count_all("balance_not_ok_ticks",
             "ticks of the whole run without balance torque for want of state or task torque",
-            [](const RunRecord& run, int64_t t) -> std::optional<bool> {
-              const balance_torque_t* balance = run.balance.at(t);
-              if (balance == nullptr) return {};
-              return balance->status == balance_torque_t::STATUS_SINGULAR ||
-                     balance->status == balance_torque_t::STATUS_INVALID_STATE ||
-                     balance->status == balance_torque_t::STATUS_HELD;
+            &RunRecord::balance, [](const balance_torque_t& balance) {
+              return balance.status == balance_torque_t::STATUS_SINGULAR ||
+                     balance.status == balance_torque_t::STATUS_INVALID_STATE ||
+                     balance.status == balance_torque_t::STATUS_HELD;
             });
   count_all("command_not_ok_ticks", "ticks of the whole run with a command of invalid input",
-            [](const RunRecord& run, int64_t t) -> std::optional<bool> {
-              const joint_command_t* command = run.command.at(t);
-              if (command == nullptr) return {};
-              return command->status == joint_command_t::STATUS_INVALID_INPUT;
+            &RunRecord::command, [](const joint_command_t& command) {
+              return command.status == joint_command_t::STATUS_INVALID_INPUT;
             });
   count_all("waiting_ticks", "ticks of the whole run in which the schedule was held back",
-            [](const RunRecord& run, int64_t t) -> std::optional<bool> {
-              const support_plan_t* plan = run.plan.at(t);
-              if (plan == nullptr) return {};
-              return plan->status == support_plan_t::STATUS_WAITING;
+            &RunRecord::plan, [](const support_plan_t& plan) {
+              return plan.status == support_plan_t::STATUS_WAITING;
             });
   list->push_back({"waiting_time", "s", "time of the whole run in which the schedule was held back",
                    [](const RunRecord& run) {

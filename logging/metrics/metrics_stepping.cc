@@ -12,12 +12,10 @@ namespace {
 
 /// Ticks in which a foot is on its way, a step each.
 std::vector<Interval> Steps(const RunRecord& run) {
-  return Intervals(run, [&](int64_t tick) -> std::optional<bool> {
-    const planner_status_t* planner = run.planner.at(tick);
-    if (planner == nullptr) return {};
-    return planner->stepping == planner_status_t::STEPPING_UNLOADING ||
-           planner->stepping == planner_status_t::STEPPING_SWINGING;
-  });
+  return Intervals(run, OfTick(run.planner, [](const planner_status_t& planner) {
+                     return planner.stepping == planner_status_t::STEPPING_UNLOADING ||
+                            planner.stepping == planner_status_t::STEPPING_SWINGING;
+                   }));
 }
 
 // Share of the largest force from which a push counts: its measurement is noisy.

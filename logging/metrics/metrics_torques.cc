@@ -156,20 +156,16 @@ void AddTorques(MetricList* list) {
        "joint-ticks in which the bridge changed what a joint was to do: torque (largest, "
        "slew, heat, end of the range) or impedance",
        [](const RunRecord& run) {
-         return Maximum(run, [&](int64_t t) -> Answer {
-           const bridge_status_t* bridge = run.bridge.at(t);
-           if (bridge == nullptr) return {};
-           return static_cast<double>(bridge->saturations);
-         });
+         return Maximum(run, OfTick(run.bridge, [](const bridge_status_t& bridge) {
+                          return static_cast<double>(bridge.saturations);
+                        }));
        }});
   list->push_back({"bridge_not_running_ticks", "",
                    "ticks in which the bridge was damping, stopping or stopped",
                    [](const RunRecord& run) {
-                     return CountTicks(run, [&](int64_t t) -> std::optional<bool> {
-                       const bridge_status_t* bridge = run.bridge.at(t);
-                       if (bridge == nullptr) return {};
-                       return bridge->state > bridge_status_t::STATE_RUNNING;
-                     });
+                     return CountTicks(run, OfTick(run.bridge, [](const bridge_status_t& bridge) {
+                                         return bridge.state > bridge_status_t::STATE_RUNNING;
+                                       }));
                    }});
 }
 

@@ -192,12 +192,10 @@ void AddTouchDowns(MetricList* list) {
                      if (run.planner.empty()) return {};
                      int stops = 0;
                      for (int foot = 0; foot < 2; ++foot) {
-                       const auto retracted =
-                           [&, f = static_cast<size_t>(foot)](int64_t t) -> std::optional<bool> {
-                         const planner_status_t* planner = run.planner.at(t);
-                         if (planner == nullptr) return {};
-                         return planner->foot_state[f] == planner_status_t::FOOT_RETRACTED;
-                       };
+                       const auto f = static_cast<size_t>(foot);
+                       const auto retracted = OfTick(run.planner, [f](const planner_status_t& p) {
+                         return p.foot_state[f] == planner_status_t::FOOT_RETRACTED;
+                       });
                        for (const Interval& stop : Intervals(run, retracted)) {
                          stops += stop.begin >= run.first_tick ? 1 : 0;
                        }

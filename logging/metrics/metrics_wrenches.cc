@@ -142,18 +142,16 @@ void AddWrenches(MetricList* list) {
                    }});
   list->push_back({"eta_infeasible_ticks", "", "ticks in which no ratio eta met all conditions",
                    [](const RunRecord& run) {
-                     return CountTicks(run, [&](int64_t t) -> std::optional<bool> {
-                       const joint_command_t* command = run.command.at(t);
-                       if (command == nullptr || !TellsRatio(*command)) return {};
-                       return command->eta_feasible == 0;
-                     });
+                     const auto none = [](const joint_command_t& command) -> std::optional<bool> {
+                       if (!TellsRatio(command)) return {};
+                       return command.eta_feasible == 0;
+                     };
+                     return CountTicks(run, OfTick(run.command, none));
                    }});
   const auto eta = [](const RunRecord& run) {
-    return [&run](int64_t t) -> Answer {
-      const joint_command_t* command = run.command.at(t);
-      if (command == nullptr || !TellsRatio(*command)) return {};
-      return command->eta;
-    };
+    return OfTick(run.command, [](const joint_command_t& command) {
+      return TellsRatio(command) ? Answer(command.eta) : Answer();
+    });
   };
   list->push_back({"eta_lowest", "", "smallest ratio eta, (61)",
                    [eta](const RunRecord& run) { return Minimum(run, eta(run)); }});
