@@ -46,11 +46,9 @@ std::string NotAchievedText(const balance_torque_t& balance) {
 
 void AddBalancing(const RunRecord& run, EventList* events) {
   for (const auto& [axis, name] : {std::pair{0, "x"}, std::pair{1, "y"}}) {
-    const auto on = [&, a = axis](int64_t tick) -> std::optional<bool> {
-      const balance_torque_t* balance = run.balance.at(tick);
-      if (balance == nullptr) return {};
-      return (a == 0 ? balance->active_x : balance->active_y) != 0;
-    };
+    const auto on = OfTick(run.balance, [&, a = axis](const balance_torque_t& balance) {
+      return (a == 0 ? balance.active_x : balance.active_y) != 0;
+    });
     const std::vector<Interval> intervals = Intervals(run, on);
     for (const Interval& interval : intervals) {
       const balance_torque_t* balance = run.balance.at(interval.begin);
@@ -60,11 +58,9 @@ void AddBalancing(const RunRecord& run, EventList* events) {
       events->AddEndOf(interval, "balancing_off", name);
     }
   }
-  const auto not_achieved = [&](int64_t tick) -> std::optional<bool> {
-    const balance_torque_t* balance = run.balance.at(tick);
-    if (balance == nullptr) return {};
-    return balance->status == balance_torque_t::STATUS_NOT_ACHIEVED;
-  };
+  const auto not_achieved = OfTick(run.balance, [](const balance_torque_t& balance) {
+    return balance.status == balance_torque_t::STATUS_NOT_ACHIEVED;
+  });
   events->AddIntervals(Intervals(run, not_achieved), "cop_not_achieved_begins",
                        "cop_not_achieved_ends",
                        [&](int64_t tick) { return NotAchievedText(*run.balance.at(tick)); });
@@ -106,11 +102,9 @@ bool WalksThere(const RunRecord& run, const planner_status_t& planner) {
 }
 
 void AddCapturePoint(const RunRecord& run, EventList* events) {
-  const auto needed = [&](int64_t tick) -> std::optional<bool> {
-    const planner_status_t* planner = run.planner.at(tick);
-    if (planner == nullptr) return {};
-    return planner->step_needed != 0 && !WalksThere(run, *planner);
-  };
+  const auto needed = OfTick(run.planner, [&](const planner_status_t& planner) {
+    return planner.step_needed != 0 && !WalksThere(run, planner);
+  });
   const std::vector<Interval> intervals = Intervals(run, needed);
   for (const Interval& interval : intervals) {
     const planner_status_t& planner = *run.planner.at(interval.begin);

@@ -81,11 +81,8 @@ std::string LimitedText(const RunRecord& run, size_t joint, const MotorLimit& li
                         const Interval& interval) {
   const std::string& name = run.robot.joints()[joint].name;
   if (limit.bit == bridge_status_t::LIMIT_IMPEDANCE) return CutText(run, joint, interval);
-  const auto applied = [&](int64_t tick) -> Answer {
-    const bridge_status_t* const bridge = run.bridge.at(tick);
-    if (bridge == nullptr) return {};
-    return bridge->applied_torque[joint];
-  };
+  const auto applied = OfTick(
+      run.bridge, [&](const bridge_status_t& bridge) { return bridge.applied_torque[joint]; });
   double from = applied(interval.begin - 1).value_or(*applied(interval.begin)), to = from;
   Answer wanted;
   for (int64_t tick = interval.begin; tick < interval.end.value_or(run.num_ticks); ++tick) {

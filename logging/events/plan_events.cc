@@ -5,6 +5,7 @@
 
 #include "fmt/format.h"
 #include "logging/events/event_groups.h"
+#include "logging/metrics/analysis.h"
 #include "logging/metrics/contact_history.h"
 #include "logging/metrics/schedule_plan.h"
 
@@ -60,11 +61,9 @@ void AddHandovers(const RunRecord& run, EventList* events) {
        {std::tuple{support_plan_t::TRANSITION_UNLOADING, "unloading_begins", "unloading_ends"},
         std::tuple{support_plan_t::TRANSITION_LOADING, "loading_begins", "loading_ends"}}) {
     for (size_t foot = 0; foot < 2; ++foot) {
-      const auto holds = [&, wanted = kind](int64_t tick) -> std::optional<bool> {
-        const support_plan_t* plan = run.plan.at(tick);
-        if (plan == nullptr) return {};
-        return plan->transition == wanted && plan->transition_foot == static_cast<int>(foot);
-      };
+      const auto holds = OfTick(run.plan, [&, wanted = kind](const support_plan_t& plan) {
+        return plan.transition == wanted && plan.transition_foot == static_cast<int>(foot);
+      });
       events->AddIntervals(Intervals(run, holds), begin, end,
                            [&](int64_t) { return FootName(run, foot); });
     }
@@ -77,11 +76,9 @@ void AddWaiting(const RunRecord& run, EventList* events) {
         std::pair{planner_status_t::WAITING_CONTACT,
                   "for the measured load to confirm the contact"},
         std::pair{planner_status_t::WAITING_NO_SURFACE, "no surface was found"}}) {
-    const auto holds = [&, wanted = reason](int64_t tick) -> std::optional<bool> {
-      const planner_status_t* planner = run.planner.at(tick);
-      if (planner == nullptr) return {};
-      return planner->waiting_for == wanted;
-    };
+    const auto holds = OfTick(run.planner, [&, wanted = reason](const planner_status_t& planner) {
+      return planner.waiting_for == wanted;
+    });
     events->AddIntervals(Intervals(run, holds), "waiting_begins", "waiting_ends",
                          [&, why = text](int64_t) { return std::string(why); });
   }

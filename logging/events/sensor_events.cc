@@ -30,11 +30,9 @@ const char* SensorFaultText(int8_t state) {
 
 void AddFootSensors(const RunRecord& run, EventList* events) {
   for (size_t foot = 0; foot < 2; ++foot) {
-    const auto broken = [&](int64_t tick) -> std::optional<bool> {
-      const estimator_status_t* status = run.estimator.at(tick);
-      if (status == nullptr) return {};
-      return SensorFaultText(status->foot_sensor[foot]) != nullptr;
-    };
+    const auto broken = OfTick(run.estimator, [&](const estimator_status_t& status) {
+      return SensorFaultText(status.foot_sensor[foot]) != nullptr;
+    });
     events->AddIntervals(
         Intervals(run, broken), "foot_sensor_fault", "foot_sensor_back", [&](int64_t tick) {
           return fmt::format("{}: its sensor {}; its wrench is observed", FootName(run, foot),

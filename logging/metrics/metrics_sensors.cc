@@ -33,12 +33,10 @@ namespace {
 /// N; none where nothing stands out of the sensor's noise.
 Answer PushPeak(const RunRecord& run) {
   const double threshold = PushThreshold(run);
-  return Maximum(run, [&](int64_t t) -> Answer {
-    const external_push_t* push = run.push.at(t);
-    if (push == nullptr) return {};
-    const double force = GetVector3(push->force).norm();
-    return force > threshold ? Answer(force) : Answer();
-  });
+  return Maximum(run, OfTick(run.push, [&](const external_push_t& push) {
+                   const double force = GetVector3(push.force).norm();
+                   return force > threshold ? Answer(force) : Answer();
+                 }));
 }
 
 void AddPush(MetricList* list) {
