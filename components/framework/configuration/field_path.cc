@@ -176,51 +176,16 @@ std::string WhichElement(const Message& message, const FieldDescriptor& field,
                      written(std::to_string(size)));
 }
 
-/// Appends an element to be overwritten, so that the rest of SetField sees one that exists.
-void AppendDefault(Message* message, const FieldDescriptor* field) {
-  const Reflection* r = message->GetReflection();
-  switch (field->cpp_type()) {
-    case FieldDescriptor::CPPTYPE_MESSAGE:
-      r->AddMessage(message, field);
-      break;
-    case FieldDescriptor::CPPTYPE_DOUBLE:
-      r->AddDouble(message, field, 0);
-      break;
-    case FieldDescriptor::CPPTYPE_FLOAT:
-      r->AddFloat(message, field, 0);
-      break;
-    case FieldDescriptor::CPPTYPE_INT32:
-      r->AddInt32(message, field, 0);
-      break;
-    case FieldDescriptor::CPPTYPE_INT64:
-      r->AddInt64(message, field, 0);
-      break;
-    case FieldDescriptor::CPPTYPE_UINT32:
-      r->AddUInt32(message, field, 0);
-      break;
-    case FieldDescriptor::CPPTYPE_UINT64:
-      r->AddUInt64(message, field, 0);
-      break;
-    case FieldDescriptor::CPPTYPE_BOOL:
-      r->AddBool(message, field, false);
-      break;
-    case FieldDescriptor::CPPTYPE_STRING:
-      r->AddString(message, field, "");
-      break;
-    case FieldDescriptor::CPPTYPE_ENUM:
-      r->AddEnum(message, field, field->enum_type()->value(0));
-      break;
-  }
-}
-
-/// Sets a scalar; index -1 for a field that is not repeated. False when `text` is no value of its
-/// type.
+/// Sets a scalar; index -1 for a field that is not repeated, the field's size for one element more.
+/// False when `text` is no value of its type, and nothing has changed then.
 bool SetScalar(Message* message, const FieldDescriptor* field, int index, std::string_view text) {
   const Reflection* r = message->GetReflection();
-  const auto set = [&](auto value, auto single, auto repeated) {
+  const auto set = [&](auto value, auto single, auto repeated, auto add) {
     if (!value.has_value()) return false;
     if (index < 0) {
       (r->*single)(message, field, *value);
+    } else if (index == r->FieldSize(*message, field)) {
+      (r->*add)(message, field, *value);
     } else {
       (r->*repeated)(message, field, index, *value);
     }
@@ -228,37 +193,37 @@ bool SetScalar(Message* message, const FieldDescriptor* field, int index, std::s
   };
   switch (field->cpp_type()) {
     case FieldDescriptor::CPPTYPE_DOUBLE:
-      return set(ParseNumber<double>(text), &Reflection::SetDouble, &Reflection::SetRepeatedDouble);
+      return set(ParseNumber<double>(text), &Reflection::SetDouble, &Reflection::SetRepeatedDouble,
+                 &Reflection::AddDouble);
     case FieldDescriptor::CPPTYPE_FLOAT:
-      return set(ParseNumber<float>(text), &Reflection::SetFloat, &Reflection::SetRepeatedFloat);
+      return set(ParseNumber<float>(text), &Reflection::SetFloat, &Reflection::SetRepeatedFloat,
+                 &Reflection::AddFloat);
     case FieldDescriptor::CPPTYPE_INT32:
-      return set(ParseNumber<int32_t>(text), &Reflection::SetInt32, &Reflection::SetRepeatedInt32);
+      return set(ParseNumber<int32_t>(text), &Reflection::SetInt32, &Reflection::SetRepeatedInt32,
+                 &Reflection::AddInt32);
     case FieldDescriptor::CPPTYPE_INT64:
-      return set(ParseNumber<int64_t>(text), &Reflection::SetInt64, &Reflection::SetRepeatedInt64);
+      return set(ParseNumber<int64_t>(text), &Reflection::SetInt64, &Reflection::SetRepeatedInt64,
+                 &Reflection::AddInt64);
     case FieldDescriptor::CPPTYPE_UINT32:
       return set(ParseNumber<uint32_t>(text), &Reflection::SetUInt32,
-                 &Reflection::SetRepeatedUInt32);
+                 &Reflection::SetRepeatedUInt32, &Reflection::AddUInt32);
     case FieldDescriptor::CPPTYPE_UINT64:
       return set(ParseNumber<uint64_t>(text), &Reflection::SetUInt64,
-                 &Reflection::SetRepeatedUInt64);
+                 &Reflection::SetRepeatedUInt64, &Reflection::AddUInt64);
     case FieldDescriptor::CPPTYPE_BOOL: {
       std::optional<bool> value;
       if (text == "true" || text == "1") value = true;
       if (text == "false" || text == "0") value = false;
-      return set(value, &Reflection::SetBool, &Reflection::SetRepeatedBool);
+      return set(value, &Reflection::SetBool, &Reflection::SetRepeatedBool, &Reflection::AddBool);
     }
     case FieldDescriptor::CPPTYPE_ENUM: {
       const auto* value = field->enum_type()->FindValueByName(std::string(text));
       return set(value != nullptr ? std::optional(value) : std::nullopt, &Reflection::SetEnum,
-                 &Reflection::SetRepeatedEnum);
+                 &Reflection::SetRepeatedEnum, &Reflection::AddEnum);
     }
     case FieldDescriptor::CPPTYPE_STRING:
-      if (index < 0) {
-        r->SetString(message, field, std::string(text));
-      } else {
-        r->SetRepeatedString(message, field, index, std::string(text));
-      }
-      return true;
+      return set(std::optional(std::string(text)), &Reflection::SetString,
+                 &Reflection::SetRepeatedString, &Reflection::AddString);
     case FieldDescriptor::CPPTYPE_MESSAGE:
       return false;
   }
@@ -377,17 +342,19 @@ void SetField(Message* message, std::string_view path, std::string_view value) {
                               fmt::join(FieldNames(*field->message_type()), ", "))
                 : fmt::format("{} is {}, not a group of fields", walked, TypeName(*field)));
     }
-    const bool append = index >= 0 && index == reflection->FieldSize(*level, field);
-    if (append) AppendDefault(level, field);
     if (last) {
       if (!SetScalar(level, field, index, value)) {
-        if (append) reflection->RemoveLast(level, field);
         fail(fmt::format("'{}' is not {}", value, TypeName(*field)));
       }
       return;
     }
-    level = index < 0 ? reflection->MutableMessage(level, field)
-                      : reflection->MutableRepeatedMessage(level, field, index);
+    if (index < 0) {
+      level = reflection->MutableMessage(level, field);
+    } else if (index == reflection->FieldSize(*level, field)) {
+      level = reflection->AddMessage(level, field);
+    } else {
+      level = reflection->MutableRepeatedMessage(level, field, index);
+    }
   }
 }
 

@@ -80,29 +80,10 @@ std::string TypeOf(const FieldDescriptor& field) {
 
 std::string DefaultOf(const FieldDescriptor& field) {
   if (!field.has_default_value()) return {};
-  switch (field.cpp_type()) {
-    case FieldDescriptor::CPPTYPE_ENUM:
-      return field.default_value_enum()->name();
-    case FieldDescriptor::CPPTYPE_BOOL:
-      return field.default_value_bool() ? "true" : "false";
-    case FieldDescriptor::CPPTYPE_DOUBLE:
-      return fmt::format("{}", field.default_value_double());
-    case FieldDescriptor::CPPTYPE_FLOAT:
-      return fmt::format("{}", field.default_value_float());
-    case FieldDescriptor::CPPTYPE_INT32:
-      return fmt::format("{}", field.default_value_int32());
-    case FieldDescriptor::CPPTYPE_INT64:
-      return fmt::format("{}", field.default_value_int64());
-    case FieldDescriptor::CPPTYPE_UINT32:
-      return fmt::format("{}", field.default_value_uint32());
-    case FieldDescriptor::CPPTYPE_UINT64:
-      return fmt::format("{}", field.default_value_uint64());
-    case FieldDescriptor::CPPTYPE_STRING:
-      return fmt::format("\"{}\"", field.default_value_string());
-    case FieldDescriptor::CPPTYPE_MESSAGE:
-      break;
-  }
-  return {};
+  google::protobuf::FieldDescriptorProto proto;
+  field.CopyTo(&proto);
+  const bool text = field.cpp_type() == FieldDescriptor::CPPTYPE_STRING;
+  return text ? fmt::format("\"{}\"", proto.default_value()) : proto.default_value();
 }
 
 void Append(const Descriptor& type, const std::string& prefix, std::vector<FieldEntry>* entries) {
