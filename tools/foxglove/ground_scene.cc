@@ -68,7 +68,7 @@ void AddPatch(const Terrain& terrain, const Eigen::Vector2d& low, const Eigen::V
 }
 
 /// How far a block has come: kAbsent, then 0 to 1 while it rises.
-double Stage(const SoftBlock& block, double time) {
+double BlockStage(const SoftBlock& block, double time) {
   // One without a start is there from the beginning, before time 0.
   if (block.start() > 0 && time < block.start()) return kAbsent;
   return block.rise() > 0 ? std::clamp((time - block.start()) / block.rise(), 0.0, 1.0) : 1;
@@ -113,7 +113,7 @@ void GroundScene::AddFloor(int64_t utime, foxglove::SceneUpdate* scene) const {
 
 std::optional<foxglove::SceneUpdate> GroundScene::Update(double time, int64_t utime) {
   const SoftBlock& block = config_.block();
-  const double stage = terrain_ != nullptr && config_.has_block() ? Stage(block, time) : kAbsent;
+  const double stage = terrain_ != nullptr && config_.has_block() ? BlockStage(block, time) : kAbsent;
   const bool first = !begun_;
   if (!first && stage == stage_) return {};
   begun_ = true;
