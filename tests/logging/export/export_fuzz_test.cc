@@ -26,7 +26,7 @@ constexpr int kDamagedLogs = 150;
 constexpr int64_t kExportFuzzTicks = 30;
 
 /// Reads PUSH and the operator's STOP, and answers with COMMAND.
-class Answer final : public Component {
+class AnswerStage final : public Component {
  public:
   void Configure(const ComponentContext&, Wiring* wiring) override {
     wiring->AddInput(&push_, "push", {});
@@ -61,7 +61,7 @@ RunSpec SpecWithComponent() {
 class ExportFuzzTest : public testing::Test {
  protected:
   ExportFuzzTest() {
-    registry_.Add("answer", "", [] { return std::make_unique<Answer>(); });
+    registry_.Add("answer", "", [] { return std::make_unique<AnswerStage>(); });
     std::vector<RawEvent> events = SmallLog(kExportFuzzTicks);
     events[0] = RunInfoEvent(SpecWithComponent());
     emergency_stop_t stop{};

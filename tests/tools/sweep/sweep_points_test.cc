@@ -19,7 +19,7 @@ Sweep Parse(const std::string& text) {
   return sweep;
 }
 
-std::string ProblemOf(const std::string& text, bool limit = false) {
+std::string SweepProblemOf(const std::string& text, bool limit = false) {
   const std::optional<SweepProblem> problem = CheckVariables(Parse(text), limit);
   return problem ? problem->field + ": " + problem->text : "";
 }
@@ -184,10 +184,10 @@ TEST(SweepPoints, ExpressionsKnowConstants) {
 }
 
 TEST(SweepPoints, NamesTheFieldThatIsWrong) {
-  EXPECT_EQ(ProblemOf("vary { name: 'a' from: 0 to: 1 steps: 2 }"), "");
-  EXPECT_EQ(ProblemOf("random: 5 vary { name: 'a' from: 0 to: 1 }"), "");
+  EXPECT_EQ(SweepProblemOf("vary { name: 'a' from: 0 to: 1 steps: 2 }"), "");
+  EXPECT_EQ(SweepProblemOf("random: 5 vary { name: 'a' from: 0 to: 1 }"), "");
   const auto starts = [](const std::string& text, const std::string& field, bool limit = false) {
-    const std::string problem = ProblemOf(text, limit);
+    const std::string problem = SweepProblemOf(text, limit);
     EXPECT_TRUE(problem.starts_with(field + ": ")) << text << " gave " << problem;
   };
   starts("", "vary");
@@ -227,8 +227,9 @@ TEST(SweepPoints, NamesTheFieldThatIsWrong) {
   starts("limit { name: 'f' min: 0 max: 1 samples: 1 }", "limit.samples", true);
   starts("limit { name: 'f' min: 0 max: 1 tolerance: 0 }", "limit.tolerance", true);
   starts("vary { name: 'f' value: 1 } limit { name: 'f' min: 0 max: 1 }", "limit", true);
-  EXPECT_EQ(ProblemOf("limit { name: 'f' min: 0 max: 1 } assign { field: 'x' value: 'f' }", true),
-            "");
+  EXPECT_EQ(
+      SweepProblemOf("limit { name: 'f' min: 0 max: 1 } assign { field: 'x' value: 'f' }", true),
+      "");
 }
 
 }  // namespace
