@@ -146,7 +146,7 @@ void RunStore::AddDerived() {
       channels_, [](const auto& channel) { return channel->name == logging::kDerivedChannel; });
   if (channels_.empty() || taken) return;
   try {
-    model_ = robot::LoadRobotTexts(robot_, urdf_);
+    model_ = record_ ? record_->robot : robot::LoadRobotTexts(robot_, urdf_);
   } catch (const robot::RobotError&) {
     return;
   }
@@ -172,6 +172,11 @@ void RunStore::ComputeDerived() const {
     }
   }
   logging::DerivedSignals signals(spec_, *model_);
+  // What an attempt before left, which threw.
+  derived_->ticks.clear();
+  derived_->offsets.clear();
+  derived_bytes_ = logging::PagedFile::Scratch();
+  std::vector<uint8_t> bytes(derived_->layout.size());
   while (true) {
     logging::TickMessages messages;
     messages.tick = std::ranges::min(sources, {}, &Source::tick).tick();
@@ -190,11 +195,9 @@ void RunStore::ComputeDerived() const {
     if (!any) continue;
     const int64_t tick = messages.tick;
     const derived::signals_t& derived = signals.Next(std::move(messages));
-    const size_t at = derived_bytes_.size();
-    derived_bytes_.resize(at + derived_->layout.size());
-    derived.encode(derived_bytes_.data() + at, 0, static_cast<int>(derived_->layout.size()));
+    derived.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    derived_->offsets.push_back(derived_bytes_->Append(bytes));
     derived_->ticks.push_back(tick);
-    derived_->offsets.push_back(at);
   }
 }
 

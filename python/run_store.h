@@ -11,6 +11,7 @@
 #include "components/framework/graph.pb.h"
 #include "components/framework/ports.h"
 #include "logging/element_names.h"
+#include "logging/paged_file.h"
 #include "logging/run_record.h"
 #include "python/message_layout.h"
 
@@ -33,7 +34,7 @@ struct StoredChannel {
 /// Immutable once Finish was called; all threads may read.
 class RunStore {
  public:
-  /// Indexes a log and maps it; decodes nothing. Throws LogError.
+  /// Indexes a log and maps it; decodes no message. Throws LogError.
   explicit RunStore(const std::string& log);
   /// An empty one in memory, for Add. `spec` must hold the channels' counts.
   RunStore(const RunSpec& spec, std::string scenario);
@@ -53,7 +54,7 @@ class RunStore {
   /// The encoded message `row` of a channel. Throws LogError when the log's file is no longer what
   /// it was.
   const uint8_t* Message(const StoredChannel& channel, size_t row) const {
-    return (&channel == derived_ ? derived_bytes_.data() : bytes_) + channel.offsets[row];
+    return (&channel == derived_ ? derived_bytes_->data() : bytes_) + channel.offsets[row];
   }
   /// Throws LogError when the log's file is no longer what it was. Called before Message.
   void CheckUnchanged() const;
@@ -91,7 +92,7 @@ class RunStore {
   std::optional<robot::RobotModel> model_;  // what signals are derived with
   StoredChannel* derived_ = nullptr;        // in channels_; nullptr: none
   mutable std::once_flag derived_once_;
-  mutable std::vector<uint8_t> derived_bytes_;
+  mutable std::unique_ptr<logging::PagedFile> derived_bytes_;  // on disk: as large as a log
   mutable std::mutex record_mutex_;
   mutable std::optional<logging::RunRecord> record_;
 };

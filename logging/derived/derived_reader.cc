@@ -6,11 +6,6 @@
 #include "logging/channel_ticks.h"
 
 namespace poise::logging {
-namespace {
-
-constexpr size_t kMostTicks = 256;  // a log may hold a message that far behind the others
-
-}  // namespace
 
 DerivedReader::DerivedReader(LogReader* reader, const RunSpec& spec, const robot::RobotModel* robot)
     : reader_(reader) {

@@ -17,6 +17,9 @@ namespace poise::logging {
 /// a run whose graph has a channel of that name or whose robot is not known.
 class DerivedReader {
  public:
+  /// Ticks that DERIVED may come behind the others: a log may hold a message that late.
+  static constexpr size_t kMostTicks = 256;
+
   /// `robot`: nullptr, not known. All must outlive it.
   DerivedReader(LogReader* reader, const RunSpec& spec, const robot::RobotModel* robot);
   /// Those of `messages`, read by `reader`.

@@ -78,7 +78,7 @@ void TickGatherer::Add(std::string_view channel, const MessageType& type,
 std::optional<TickMessages> TickGatherer::Take(bool end) {
   if (ticks_.empty()) return {};
   const auto oldest = ticks_.begin();
-  const bool due = newest_ >= oldest->first + every_ && oldest->second.num_parts() == parts_.size();
+  const bool due = newest_ - oldest->first >= every_ && oldest->second.num_parts() == parts_.size();
   if (!end && !due && ticks_.size() <= most_) return {};
   return TakeTick(oldest->first);
 }

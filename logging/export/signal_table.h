@@ -36,7 +36,7 @@ struct ChannelColumns {
 struct RowColumn {
   std::string field;
   bool integer = false;
-  std::vector<double> values;  ///< of a row's first message; NaN: the row has none
+  std::vector<double> values;  ///< of a row's first message that tells one; NaN: none does
   /// Least and largest of all the row's messages; empty where each row is a tick.
   std::vector<double> least;
   std::vector<double> largest;

@@ -18,7 +18,11 @@ namespace {
 using Store = std::shared_ptr<const RunStore>;
 
 const StoredChannel& ChannelOf(const RunStore& run, const std::string& name) {
-  const StoredChannel* const channel = run.Find(name);
+  const StoredChannel* channel = nullptr;
+  {
+    const py::gil_scoped_release released;  // DERIVED is computed when it is first asked for
+    channel = run.Find(name);
+  }
   if (channel != nullptr) return *channel;
   std::string names;
   for (const auto& each : run.channels()) names += (names.empty() ? "" : ", ") + each->name;

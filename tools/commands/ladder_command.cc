@@ -158,7 +158,7 @@ void AddLadderCommand(CLI::App* app, Command* command) {
   AddSweepOptions(ladder, arguments.get(), session.get());
   ladder->footer(
       "Rungs, N·s by direction of the push: the bound of as many steps as wanted from reach, "
-      "soles and the hips' effort, m w (r + sum l_k e^(-w t_k)); what the planner catches on a "
+      "soles and the least swing, m w (r + sum l_k e^(-w t_k)); what the planner catches on a "
       "point mass whose feet go where they are told; the ideal robot (--ideal); the robot. The "
       "share kept from each rung to the next says where a robot loses. sweep: default "
       "push_ladder, some 16 x 10 runs a rung; a limit of its own pushes once, by "

@@ -73,8 +73,9 @@ foxglove::SceneUpdate ContactScene::Forces(const TickMessages& tick) const {
   const std::vector<wrench_t> none;
   AddFootForces(tick, tick.command ? tick.command->foot_wrench : none,
                 &derived::foot_t::cop_computed, "computed forces", kThick, kComputed, &scene);
-  AddFootForces(tick, tick.sensors ? tick.sensors->foot_wrench : none,
-                &derived::foot_t::cop_measured, "measured forces", kThin, kMeasured, &scene);
+  // As the controller knows them: read, or observed where there is no good sensor.
+  AddFootForces(tick, tick.state ? tick.state->foot_wrench : none, &derived::foot_t::cop_measured,
+                "measured forces", kThin, kMeasured, &scene);
   foxglove::SceneEntity* const push = AddEntity(tick.utime, kWorldFrame, "push", &scene);
   if (tick.push && GetVector3(tick.push->force).norm() > kLeastPush) {
     const Vector3d arrow = kPushScale * kMetresPerNewton * GetVector3(tick.push->force);

@@ -13,12 +13,11 @@ inline constexpr double kMetresPerNewton = 1.0 / 900;
 
 class ContactScene {
  public:
-  /// `model` must outlive it.
   explicit ContactScene(const robot::RobotModel& model);
 
   /// Each foot's ground force on the robot at its centre of pressure (DERIVED), measured
-  /// (ROBOT_SENSORS) and computed (JOINT_COMMAND), and the push. Entities that the tick does not
-  /// tell are empty.
+  /// or observed (ROBOT_STATE) and computed (JOINT_COMMAND), and the push. Entities that the tick
+  /// does not tell are empty.
   foxglove::SceneUpdate Forces(const logging::TickMessages& tick) const;
   /// Soles, support polygon, the region that the centre of pressure is kept in, centre of pressure
   /// computed and measured, capture point, foothold of a step, COM.

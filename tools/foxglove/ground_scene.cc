@@ -113,7 +113,8 @@ void GroundScene::AddFloor(int64_t utime, foxglove::SceneUpdate* scene) const {
 
 std::optional<foxglove::SceneUpdate> GroundScene::Update(double time, int64_t utime) {
   const SoftBlock& block = config_.block();
-  const double stage = terrain_ != nullptr && config_.has_block() ? BlockStage(block, time) : kAbsent;
+  const double stage =
+      terrain_ != nullptr && config_.has_block() ? BlockStage(block, time) : kAbsent;
   const bool first = !begun_;
   if (!first && stage == stage_) return {};
   begun_ = true;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "fmt/format.h"
+#include "logging/derived/derived_reader.h"
 #include "logging/events/events.h"
 #include "logging/printable.h"
 #include "logging/run_record.h"
@@ -19,9 +20,12 @@ class Scene : public logging::McapTopics {
   Scene(logging::RunRecord run, Scenario scenario)
       : run_(std::move(run)),
         scenario_(std::move(scenario)),
-        topics_(run_, scenario_, [this](size_t topic, uint64_t time, const std::string& message) {
-          writer_->AddMessage(channels_[topic], counts_[topic]++, time, message);
-        }) {}
+        topics_(
+            run_, scenario_,
+            [this](size_t topic, uint64_t time, const std::string& message) {
+              writer_->AddMessage(channels_[topic], counts_[topic]++, time, message);
+            },
+            logging::DerivedReader::kMostTicks) {}
 
   void Begin(logging::McapWriter* writer) override {
     writer_ = writer;

@@ -81,7 +81,8 @@ bool ReadTruth(const ground_truth_t& truth, robot::RobotState* state) {
 
 }  // namespace
 
-SceneTopics::SceneTopics(const logging::RunRecord& run, const Scenario& scenario, Emit emit)
+SceneTopics::SceneTopics(const logging::RunRecord& run, const Scenario& scenario, Emit emit,
+                         size_t late)
     : run_(run),
       emit_(std::move(emit)),
       topics_{ProtobufTopic<foxglove::FrameTransforms>("/tf", false),
@@ -96,7 +97,9 @@ SceneTopics::SceneTopics(const logging::RunRecord& run, const Scenario& scenario
       frames_(run.robot),
       contacts_(run.robot),
       ground_(scenario),
-      gatherer_(run.spec, PictureTicks(run.spec)),
+      gatherer_(
+          run.spec, PictureTicks(run.spec),
+          logging::TickGatherer::kFewTicks + late / static_cast<size_t>(PictureTicks(run.spec))),
       state_(run.robot.num_joints()) {
   for (const robot::Joint& joint : run.robot.joints()) joint_names_.push_back(joint.name);
 }

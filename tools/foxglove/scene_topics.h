@@ -34,8 +34,8 @@ class SceneTopics {
   using Emit = std::function<void(size_t topic, uint64_t time, std::string message)>;
 
   /// Takes a run's info, spec and robot alone; `run` must outlive it. Meshes are read where the run
-  /// found them.
-  SceneTopics(const logging::RunRecord& run, const Scenario& scenario, Emit emit);
+  /// found them. DERIVED may come `late` ticks behind the others.
+  SceneTopics(const logging::RunRecord& run, const Scenario& scenario, Emit emit, size_t late = 0);
 
   const std::vector<SceneTopic>& topics() const { return topics_; }
   /// What does not change: frames, robot and description.

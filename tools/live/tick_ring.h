@@ -14,7 +14,7 @@ namespace poise {
 /// Every scalar of every channel of a run's graph by tick, and what follows from them (DERIVED):
 /// the signals of docs/reference/report_format.md. A tick is taken when all channels have it, or
 /// when the run is kMaxLead ticks beyond it and what lacks is lost; its numbers are then NaN. The
-/// first one held is whole. Memory is all taken at the start.
+/// first one held is whole. Memory does not grow with the run.
 class TickRing {
  public:
   struct Signal {

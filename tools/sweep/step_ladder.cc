@@ -15,6 +15,7 @@ using Eigen::Vector2d;
 
 // After as many steps what one more adds is below a thousandth of the first.
 constexpr int kMostSteps = 12;
+constexpr double kBeyondReach = 10;  // m
 
 /// m, of the polygon's farthest point along `direction`.
 double Farthest(const balance::ConvexPolygon& polygon, const Vector2d& direction) {
@@ -25,23 +26,17 @@ double Farthest(const balance::ConvexPolygon& polygon, const Vector2d& direction
   return farthest;
 }
 
-/// m along `direction`, from the sole that stands to the farthest that `foot` reaches, wherever the
-/// COM is.
+/// m along `direction`, from the sole that stands to the farthest that `foot` reaches, the COM as
+/// far as the stance leg, and its sole that rolls over its edge, let it go.
 double StepLength(const stepping::Reach& reach, robot::Foot foot, const Vector2d& direction) {
   using stepping::Crossing;
   double longest = -std::numeric_limits<double>::infinity();
-  // The stance sole is at the origin: the COM is where that leg lets it be.
-  for (const Vector2d& sole : reach.Leg(Other(foot), 1).corners()) {
-    for (const Crossing crossing : {Crossing::kNone, Crossing::kInFront, Crossing::kBehind}) {
-      longest = std::max(longest, Farthest(reach.Footholds(foot, -sole, crossing), direction));
-    }
+  for (const Crossing crossing : {Crossing::kNone, Crossing::kInFront, Crossing::kBehind}) {
+    const balance::ConvexPolygon footholds =
+        reach.Footholds(foot, kBeyondReach * direction, crossing);
+    longest = std::max(longest, Farthest(footholds, direction));
   }
   return longest;
-}
-
-/// m, where `foot` stands beside the other one.
-Vector2d Standing(const robot::RobotModel& model, robot::Foot foot) {
-  return {0, robot::Side(foot) * robot::StandingSpacing(model)};
 }
 
 }  // namespace
@@ -63,17 +58,12 @@ double StepLadder::Bound(const Vector2d& direction) const {
   const double edge = Farthest(standing.Soles(0), direction);
   double best = 0;
   for (const robot::Foot first : robot::kFeet) {
-    // The foot that steps is as far behind the one that stands as its last way ahead.
-    double caught = 0, time = limits.unload, behind = Standing(model_, first).dot(-direction);
+    double caught = 0, time = limits.unload;
     robot::Foot foot = first;
     for (int k = 0; k < kMostSteps; ++k, foot = robot::Other(foot)) {
-      const double length = StepLength(choice.reach(), foot, direction);
-      const double swing =
-          stepping::LeastSwingTime(std::max(0.0, behind + length), limits.acceleration);
-      time += std::max(limits.least_swing, swing);
-      caught += length * std::exp(-frequency * time);
+      time += limits.least_swing;
+      caught += StepLength(choice.reach(), foot, direction) * std::exp(-frequency * time);
       best = std::max(best, caught);
-      behind = length;
     }
   }
   return model_.total_mass() * frequency * (edge + best);

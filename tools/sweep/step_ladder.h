@@ -17,10 +17,10 @@ class StepLadder {
 
   /// N·s, the bound of N steps, of any number: m ω (r + Σ l_k e^{−ω t_k}). r is the way from the
   /// COM to the soles' edge, l_k that from the sole that stands to the farthest one that the foot
-  /// whose turn it is reaches, both along the unit vector `direction`; at t_k it is there, as soon
-  /// as the hips bring it from where it was. The feet take turns, and the better one begins. The
-  /// longest step is the best as long as it takes less than 2/ω. Koolen, de Boer, Rebula, Goswami,
-  /// Pratt: Capturability-based analysis and control of legged locomotion, part 1, IJRR 2012.
+  /// whose turn it is reaches, both along the unit vector `direction`; t_k is k times the least
+  /// swing and the first foot's unloading. The feet take turns, and the better one begins. Koolen,
+  /// de Boer, Rebula, Goswami, Pratt: Capturability-based analysis and control of legged
+  /// locomotion, part 1, IJRR 2012.
   double Bound(const Eigen::Vector2d& direction) const;
   /// Whether the planner's steps keep a point mass from falling (PointMass) for `duration`, s, with
   /// a push whose start is counted from its start.

@@ -65,7 +65,7 @@ function rowsOf(run) {
 /** Of a run whose planner makes steps. */
 function stepRows(run) {
   if (!run.find(FOOTSTEPS, 'stance')) return [];
-  const caught = ([stance, steps]) => (Number.isNaN(stance) ? '–' : Number.isNaN(steps) ? 'on both feet'
+  const caught = ([stance, steps]) => (Number.isNaN(stance) ? '–' : Number.isNaN(steps) ? (stance < 0 ? 'on both feet' : '–')
     : steps > 2 ? 'beyond 2 steps' : `${steps} step${steps === 1 ? '' : 's'}`);
   const touchDown = run.find(FOOTSTEPS, 'touch_down[0]'), planned = run.find(FOOTSTEPS, 'planned');
   return [['capture point within', [run.find(FOOTSTEPS, 'stance'), run.find(DERIVED, 'capture_steps')], caught],

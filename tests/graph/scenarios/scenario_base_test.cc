@@ -94,11 +94,11 @@ TEST_F(ScenarioBaseTest, AnErrorNamesTheFileThatSetTheField) {
   ExpectRefused(File("derived"), {File("derived") + ":2:", "no_such"});
 
   std::string base = ReadFile(File("base/robot"));
-  base.replace(base.find("half_length: 0.13"), 17, "half_length: -13.");
   Write("base/robot", base + "check { metric: \"push_impulze\" }\n");
   Derived("");
   ExpectRefused(File("derived"),
                 {BaseLine("check { metric: \"push_impulze"), "check[1].metric", "push_impulse"});
+  base.replace(base.find("half_length: 0.13"), 17, "half_length: -13.");
   Write("base/robot", base);
   ExpectRefused(File("derived"), {BaseLine("double_support { half_length: -13"),
                                   "contact_wrench_monitor.double_support.half_length"});

@@ -146,6 +146,7 @@ TEST(OpenLink, TakesExactlyOneKind) {
   config.mutable_udp()->set_port(70000);
   EXPECT_THAT(ErrorOf([&] { OpenLink(config); }),
               HasSubstr("link.udp.port: is 70000; must be 1 to 65535"));
+  config.mutable_udp()->clear_port();
   config.set_interface("no_such_if");
   EXPECT_THAT(ErrorOf([&] { OpenLink(config); }), HasSubstr("either udp or interface"));
   config.clear_udp();

@@ -51,8 +51,8 @@ function contactSignals(run) {
   const truth = run.find('ground_truth_t', 'foot_pose[0].position[0]');
   return Object.assign({}, ...run.robot.feet.map((_, f) => ({
     ...pose(`sole${f}`, truth ? 'ground_truth_t' : 'planner_status_t', `foot_pose[${f}]`),
-    ...vector(`measured${f}.force`, 'robot_sensors_t', `foot_wrench[${f}].force`),
-    ...vector(`measured${f}.moment`, 'robot_sensors_t', `foot_wrench[${f}].moment`),
+    ...vector(`measured${f}.force`, 'robot_state_t', `foot_wrench[${f}].force`),
+    ...vector(`measured${f}.moment`, 'robot_state_t', `foot_wrench[${f}].moment`),
     ...vector(`measured${f}.cop`, DERIVED, `foot[${f}].cop_measured`, 2),
     ...vector(`computed${f}.force`, 'joint_command_t', `foot_wrench[${f}].force`),
     ...vector(`computed${f}.moment`, 'joint_command_t', `foot_wrench[${f}].moment`),

@@ -340,9 +340,9 @@ TEST_F(DerivedSignalsTest, EveryFieldHasADefinition) {
   TickMessages messages;
   messages.tick = 0;
   const derived::signals_t& none = signals.Next(messages);
-  for (const MessageScalar& scalar :
-       ScalarsOf(*FindMessageType(MessageTraits<derived::signals_t>::kName), Encode(none))
-           .value()) {
+  const auto scalars =
+      ScalarsOf(*FindMessageType(MessageTraits<derived::signals_t>::kName), Encode(none));
+  for (const MessageScalar& scalar : scalars.value()) {
     const std::string& path = scalar.path;
     if (path.starts_with("num_") || path == "run_id" || path == "tick" || path == "utime") continue;
     EXPECT_TRUE(signals.Tells(path)) << path;
