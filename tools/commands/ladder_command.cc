@@ -11,7 +11,6 @@
 #include "fmt/format.h"
 #include "tools/cli/text_table.h"
 #include "tools/commands/commands.h"
-#include "tools/scenario/push_bound.h"
 #include "tools/sweep/step_ladder.h"
 #include "tools/sweep/sweep_session.h"
 #include "tools/sweep/sweep_table.h"
@@ -20,6 +19,7 @@ namespace poise {
 namespace {
 
 constexpr char kDefaultSweep[] = "push_ladder";
+constexpr char kField[] = "sim.push[0].scaled_impulse";  // a share of m √(g h)
 
 /// N·s that a direction's rungs survive; empty: not even the smallest push.
 struct Rungs {
@@ -109,13 +109,17 @@ std::string Format(const std::vector<Rungs>& rungs) {
 }
 
 int RunLadder(SweepArguments arguments, const SessionOptions& options) {
+  if (!options.range.empty() || !options.part.empty()) {
+    throw ConfigError(options.range.empty() ? "--part" : "--range",
+                      "is not for a ladder, whose table has all directions");
+  }
   if (arguments.what.empty()) arguments.what = kDefaultSweep;
   const SweepDefinition definition(arguments, /*limit=*/true);
   const auto points = static_cast<int64_t>(definition.points().size());
   const double least = definition.sweep().limit().min();
   const LoadedScenario loaded = LoadScenario(definition.scenario(), definition.ChangesOf(0, least));
   const Scenario& scenario = loaded.scenario;
-  if (scenario.sim().push_size() != 1 || !scenario.sim().push(0).has_scaled_impulse()) {
+  if (scenario.sim().push_size() != 1 || definition.sweep().limit().field() != kField) {
     throw ConfigError(
         definition.name(),
         "is no ladder's sweep: it needs one push, and limit.field "
@@ -161,7 +165,7 @@ void AddLadderCommand(CLI::App* app, Command* command) {
       "soles and the least swing, m w (r + sum l_k e^(-w t_k)); what the planner catches on a "
       "point mass whose feet go where they are told; the ideal robot (--ideal); the robot. The "
       "share kept from each rung to the next says where a robot loses. sweep: default "
-      "push_ladder, some 16 x 10 runs a rung; a limit of its own pushes once, by "
+      "push_ladder, some 180 runs a rung; a limit of its own pushes once, by "
       "scaled_impulse. Exit code: as poise sweep.\n"
       "Example: poise ladder --set robot=heron/heron --world mujoco");
   ladder->callback([arguments, session, command] {

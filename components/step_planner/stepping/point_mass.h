@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
+#include <cmath>
 
 #include "components/balance/convex_polygon.h"
 #include "components/robot/robot_model.h"
@@ -36,7 +38,6 @@ class PointMass {
   double frequency() const { return std::sqrt(robot::kGravity / com_.z()); }  ///< 1/s
   /// Hull of the soles in contact, `margin` m off their edges.
   balance::ConvexPolygon Soles(double margin) const;
-  bool in_contact(Foot foot) const { return in_contact_[foot]; }
   const Eigen::Isometry3d& sole(Foot foot) const { return sole_[Index(foot)]; }
   const Eigen::Vector3d& com() const { return com_; }
   const Eigen::Vector3d& velocity() const { return velocity_; }
