@@ -18,12 +18,11 @@ constexpr int kAttempts = 3;                      // frames for a datagram
 }  // namespace
 
 Attendant::Attendant(const MasterConfig* config, const SlaveSetup* setup, ClockPlan clocks,
-                     const std::vector<SlaveAccess>& slaves, const std::vector<int>& positions,
-                     const Timeouts& timeouts, bool lockstep, Say say)
+                     const std::vector<SlaveAccess>& slaves, const Timeouts& timeouts,
+                     bool lockstep, Say say)
     : config_(config),
       setup_(setup),
       clocks_(std::move(clocks)),
-      positions_(positions),
       lockstep_(lockstep),
       say_(std::move(say)),
       transactions_(&slot_, timeouts.state, kAttempts),
@@ -31,8 +30,7 @@ Attendant::Attendant(const MasterConfig* config, const SlaveSetup* setup, ClockP
       left_at_(slaves.size(), -1) {
   for (const SlaveAccess& slave : slaves) {
     slaves_.push_back(slave.Through(&transactions_));
-    Cell& cell = cells_.emplace_back();
-    cell.al = static_cast<uint8_t>(AlState::kOp);
+    diagnoses_.emplace_back().al = static_cast<uint8_t>(AlState::kOp);
   }
   thread_ = std::thread([this] { Run(); });
 }
@@ -49,21 +47,6 @@ void Attendant::BeginCycle(int64_t now, bool trouble) {
   if (trouble) trouble_.store(true, std::memory_order_relaxed);
   slot_.Advance(now);
   if (lockstep_) slot_.Settle();
-}
-
-SlaveDiagnosis Attendant::diagnosis(size_t slave) const {
-  const Cell& cell = cells_[slave];
-  const uint32_t al = cell.al.load(std::memory_order_relaxed);
-  return {.online = cell.online.load(std::memory_order_relaxed),
-          .al_status = static_cast<uint8_t>(al),
-          .al_code = static_cast<uint16_t>(al >> 16),
-          .error_code = cell.error_code.load(std::memory_order_relaxed),
-          .emergency = cell.emergency.load(std::memory_order_relaxed),
-          .emergencies = cell.emergencies.load(std::memory_order_relaxed),
-          .clock_difference = cell.clock_difference.load(std::memory_order_relaxed),
-          .receive_errors = cell.receive_errors.load(std::memory_order_relaxed),
-          .lost_links = cell.lost_links.load(std::memory_order_relaxed),
-          .recoveries = cell.recoveries.load(std::memory_order_relaxed)};
 }
 
 void Attendant::Complain(size_t slave, const std::string& line) {
@@ -100,13 +83,13 @@ void Attendant::LookAt(size_t slave, int turn) {
 }
 
 bool Attendant::NoteState(size_t slave) {
-  Cell& cell = cells_[slave];
+  SlaveDiagnosis& shown = diagnoses_[slave];
   std::array<uint8_t, 6> bytes{};
   const auto counter =
       transactions_.Execute(Command::kFprd, slaves_[slave].station(), reg::kAlStatus, bytes, 1);
-  cell.online = counter && *counter == 1;
-  if (cell.online) cell.al = uint32_t{bytes[0]} | uint32_t{Get<uint16_t>(bytes, 4)} << 16;
-  const bool operational = cell.online && bytes[0] == static_cast<uint8_t>(AlState::kOp);
+  shown.online = counter && *counter == 1;
+  if (shown.online) shown.al = uint32_t{bytes[0]} | uint32_t{Get<uint16_t>(bytes, 4)} << 16;
+  const bool operational = shown.online && bytes[0] == static_cast<uint8_t>(AlState::kOp);
   if (operational) {
     left_at_[slave] = -1;
     complaints_[slave].clear();
@@ -117,7 +100,7 @@ bool Attendant::NoteState(size_t slave) {
 }
 
 void Attendant::NoteDetails(size_t slave, int turn) {
-  Cell& cell = cells_[slave];
+  SlaveDiagnosis& shown = diagnoses_[slave];
   SlaveAccess& access = slaves_[slave];
   // One of them a round.
   switch (turn % 4) {
@@ -129,41 +112,39 @@ void Attendant::NoteDetails(size_t slave, int turn) {
       for (size_t i = reg::kLostLinks - reg::kReceiveErrors; i < errors.size(); ++i) {
         lost += errors[i];
       }
-      cell.receive_errors = received;
-      cell.lost_links = lost;
+      shown.receive_errors = received;
+      shown.lost_links = lost;
       return;
     }
     case 1:
       if (clocks_.running && clocks_.has_clock[slave]) {
-        cell.clock_difference = DcDifference(access.Read<uint32_t>(reg::kDcDifference));
+        shown.clock_difference = DcDifference(access.Read<uint32_t>(reg::kDcDifference));
       }
       return;
     case 2:
       access.PollMailbox();
-      cell.emergencies = access.emergencies();
-      cell.emergency = access.last_emergency().code;
+      shown.emergencies = access.emergencies();
+      shown.emergency = access.last_emergency().code;
       return;
     default:
-      if (!setup_->is_drive(slave)) return;
-      cell.error_code = static_cast<uint16_t>(access.Upload({object::kErrorCode, 0}));
-      cell.emergencies = access.emergencies();
-      cell.emergency = access.last_emergency().code;
+      if (setup_->slave(slave).drive == nullptr) return;
+      shown.error_code = static_cast<uint16_t>(access.Upload({object::kErrorCode, 0}));
+      shown.emergencies = access.emergencies();
+      shown.emergency = access.last_emergency().code;
   }
 }
 
 void Attendant::Recover(size_t slave) {
   SlaveAccess& access = slaves_[slave];
-  Cell& cell = cells_[slave];
-  if (!cell.online) {
+  SlaveDiagnosis& shown = diagnoses_[slave];
+  if (!shown.online) {
     // Its configured address is gone with its power; its place is not.
-    std::array<uint8_t, 2> station{};
-    const auto counter = transactions_.Execute(
-        Command::kAprd, AutoIncrementAddress(positions_[slave]), reg::kStationAddress, station, 1);
-    if (!counter || *counter != 1) {
+    const std::optional<uint16_t> station = access.FindStation();
+    if (!station) {
       Complain(slave, fmt::format("{}: does not answer; cable or power", access.Describe()));
       return;
     }
-    if (Get<uint16_t>(station, 0) != 0) return;  // another one's place: the chain is cut before it
+    if (*station != 0) return;  // another one's place: the chain is cut before it
     Complain(slave, fmt::format("{}: has started anew; it is led back", access.Describe()));
     Rejoin(slave);
   } else {
@@ -178,7 +159,7 @@ void Attendant::Recover(size_t slave) {
     }
   }
   if (!NoteState(slave)) return;
-  ++cell.recoveries;
+  ++shown.recoveries;
   ++recoveries_;
   if (say_) say_(fmt::format("{}: is in OP again", access.Describe()));
 }
@@ -211,10 +192,7 @@ void Attendant::StartClock(size_t slave) {
 
 void Attendant::Rejoin(size_t slave) {
   SlaveAccess& access = slaves_[slave];
-  std::array<uint8_t, 2> station{};
-  Put<uint16_t>(station, 0, access.station());
-  static_cast<void>(transactions_.Execute(Command::kApwr, AutoIncrementAddress(positions_[slave]),
-                                          reg::kStationAddress, station));
+  static_cast<void>(access.AssignStation());
   access.RequestState(AlState::kInit);
   access.AwaitInit();
   constexpr std::array<uint8_t, kNumFmmus * kFmmuSize> kZeros{};

@@ -14,18 +14,21 @@
 
 namespace poise::ethercat {
 
-/// What a slave has shown of late.
+/// What a slave has shown of late; written by the attendant's thread alone.
 struct SlaveDiagnosis {
-  bool online = true;       ///< it answers
-  uint8_t al_status = 0;    ///< register 0x0130: state, and 0x10 for an error
-  uint16_t al_code = 0;     ///< register 0x0134
-  uint16_t error_code = 0;  ///< 603F; 0 of a slave that is no drive
-  uint16_t emergency = 0;   ///< the last one's code
-  int64_t emergencies = 0;
-  int32_t clock_difference = 0;  ///< ns, register 0x092C
-  int32_t receive_errors = 0;    ///< registers 0x0300 to 0x0307, of all ports
-  int32_t lost_links = 0;        ///< registers 0x0310 to 0x0313, of all ports
-  int64_t recoveries = 0;        ///< times that it was led back to OP
+  uint8_t al_status() const { return static_cast<uint8_t>(al.load()); }
+  uint16_t al_code() const { return static_cast<uint16_t>(al.load() >> 16); }
+
+  std::atomic<bool> online{true};  ///< it answers
+  /// Register 0x0130, state and 0x10 for an error, and register 0x0134 above it.
+  std::atomic<uint32_t> al{0};
+  std::atomic<uint16_t> error_code{0};  ///< 603F; 0 of a slave that is no drive
+  std::atomic<uint16_t> emergency{0};   ///< the last one's code
+  std::atomic<int64_t> emergencies{0};
+  std::atomic<int32_t> clock_difference{0};  ///< ns, register 0x092C
+  std::atomic<int32_t> receive_errors{0};    ///< registers 0x0300 to 0x0307, of all ports
+  std::atomic<int32_t> lost_links{0};        ///< registers 0x0310 to 0x0313, of all ports
+  std::atomic<int64_t> recoveries{0};        ///< times that it was led back to OP
 };
 
 /// How clocks are kept, for slaves that come back.
@@ -45,8 +48,8 @@ class Attendant {
   /// this thread waits for it, so that the same cycles give the same frames. `say`: told of slaves
   /// that leave OP and come back, from this thread.
   Attendant(const MasterConfig* config, const SlaveSetup* setup, ClockPlan clocks,
-            const std::vector<SlaveAccess>& slaves, const std::vector<int>& positions,
-            const Timeouts& timeouts, bool lockstep, Say say);
+            const std::vector<SlaveAccess>& slaves, const Timeouts& timeouts, bool lockstep,
+            Say say);
   /// Ends the thread.
   ~Attendant();
 
@@ -54,19 +57,11 @@ class Attendant {
   SlotLink& slot() { return slot_; }
   /// A cycle begins at `now`, ns. `trouble`: not all slaves are in OP, or not all have answered.
   void BeginCycle(int64_t now, bool trouble);
-  SlaveDiagnosis diagnosis(size_t slave) const;
+  const SlaveDiagnosis& diagnosis(size_t slave) const { return diagnoses_[slave]; }
   /// All slaves' recoveries.
   int64_t recoveries() const { return recoveries_.load(std::memory_order_relaxed); }
 
  private:
-  struct Cell {
-    std::atomic<bool> online{true};
-    std::atomic<uint32_t> al{0};  // status, and the code above it
-    std::atomic<uint16_t> error_code{0}, emergency{0};
-    std::atomic<int64_t> emergencies{0}, recoveries{0};
-    std::atomic<int32_t> clock_difference{0}, receive_errors{0}, lost_links{0};
-  };
-
   void Run();
   void LookAt(size_t slave, int turn);
   /// Whether the slave is in OP without an error.
@@ -82,13 +77,12 @@ class Attendant {
   const MasterConfig* config_;
   const SlaveSetup* setup_;
   ClockPlan clocks_;
-  std::vector<int> positions_;
   bool lockstep_;
   Say say_;
   SlotLink slot_;
   Transactions transactions_;
   std::vector<SlaveAccess> slaves_;
-  std::deque<Cell> cells_;
+  std::deque<SlaveDiagnosis> diagnoses_;
   std::vector<std::string> complaints_;  // the last line of each slave
   std::vector<int64_t> left_at_;         // ns, when a slave was first seen outside OP; -1: in OP
   std::atomic<bool> trouble_{false}, ended_{false};

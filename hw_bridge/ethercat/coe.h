@@ -11,7 +11,10 @@ namespace poise::ethercat {
 
 inline constexpr size_t kMailboxHeader = 6;
 inline constexpr size_t kCoeHeader = 2;
-inline constexpr size_t kSdoMessage = kMailboxHeader + 2 + 8;  ///< of an expedited SDO, bytes
+/// Bytes of an expedited SDO, and of a normal transfer's first message before its data.
+inline constexpr size_t kSdoMessage = kMailboxHeader + kCoeHeader + 8;
+inline constexpr size_t kSegmentHeader = kMailboxHeader + kCoeHeader + 1;  ///< before its data
+inline constexpr size_t kExpedited = 4;  ///< bytes of data at most
 
 enum class MailboxType : uint8_t { kError = 0, kCoe = 3 };
 
@@ -54,6 +57,7 @@ enum class CoeService : uint8_t {
   kSdoInformation = 8,
 };
 
+/// Each request is followed by its response.
 enum class SdoCommand {
   kUploadRequest,
   kUploadResponse,   ///< expedited, or the first part of a normal or segmented transfer
@@ -66,6 +70,10 @@ enum class SdoCommand {
   kAbort,
   kOther,
 };
+
+constexpr SdoCommand ResponseTo(SdoCommand request) {
+  return static_cast<SdoCommand>(static_cast<int>(request) + 1);
+}
 
 struct ObjectAddress {
   uint16_t index = 0;

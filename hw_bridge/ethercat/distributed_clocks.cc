@@ -5,17 +5,9 @@
 namespace poise::ethercat {
 namespace {
 
-constexpr uint8_t kHasClock = 0x04, kHas64Bits = 0x08;  // of register 0x0008
-constexpr int64_t kSync0Lead = 100 * kMillisecond;      // between setting SYNC0 and its first pulse
-constexpr uint16_t kSpeedStart = 0x1000;                // an ESC's default, which resets the loop
+constexpr int64_t kSync0Lead = 100 * kMillisecond;  // between setting SYNC0 and its first pulse
+constexpr uint16_t kSpeedStart = 0x1000;            // an ESC's default, which resets the loop
 constexpr uint8_t kTimeFilter = 0x00, kSpeedFilter = 0x0C;  // an ESC's defaults
-
-void Latch(Transactions* transactions) {
-  std::array<uint8_t, 4> latch{};
-  if (!transactions->Execute(Command::kBwr, 0, reg::kDcReceiveTime, latch)) {
-    throw EthercatError("latching the slaves' clocks: no frame came back");
-  }
-}
 
 void SetUpClock(SlaveAccess* slave, int32_t delay, int64_t offset) {
   slave->Write<uint32_t>(reg::kDcDelay, static_cast<uint32_t>(delay));
@@ -27,14 +19,16 @@ void SetUpClock(SlaveAccess* slave, int32_t delay, int64_t offset) {
 
 }  // namespace
 
-bool HasClock(SlaveAccess* slave) {
-  const auto features = slave->Read<uint8_t>(reg::kFeatures);
-  return (features & kHasClock) != 0 && (features & kHas64Bits) != 0;
+void LatchClocks(Transactions* transactions) {
+  std::array<uint8_t, 4> latch{};
+  if (!transactions->Execute(Command::kBwr, 0, reg::kDcReceiveTime, latch)) {
+    throw EthercatError("latching the slaves' clocks: no frame came back");
+  }
 }
 
 void SetUpClocks(Transactions* transactions, std::span<SlaveAccess* const> slaves,
                  std::span<const int32_t> delays, int64_t epoch) {
-  Latch(transactions);
+  LatchClocks(transactions);
   for (size_t i = 0; i < slaves.size(); ++i) {
     const auto unit = slaves[i]->Read<int64_t>(reg::kDcReceiveTimeUnit);
     SetUpClock(slaves[i], delays[i], epoch + delays[i] - unit);
@@ -43,7 +37,7 @@ void SetUpClocks(Transactions* transactions, std::span<SlaveAccess* const> slave
 
 void JoinClock(Transactions* transactions, SlaveAccess* reference, SlaveAccess* slave,
                int32_t delay) {
-  Latch(transactions);
+  LatchClocks(transactions);
   const auto time = static_cast<uint64_t>(reference->Read<int64_t>(reg::kDcReceiveTimeUnit)) +
                     static_cast<uint64_t>(reference->Read<int64_t>(reg::kDcOffset));
   const auto unit = static_cast<uint64_t>(slave->Read<int64_t>(reg::kDcReceiveTimeUnit));

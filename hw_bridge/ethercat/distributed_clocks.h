@@ -8,8 +8,9 @@
 
 namespace poise::ethercat {
 
-/// Whether a slave has a 64-bit distributed clock.
-bool HasClock(SlaveAccess* slave);
+/// Makes every slave keep when this one broadcast passes its ports. Throws EthercatError: no frame
+/// came back.
+void LatchClocks(Transactions* transactions);
 
 /// Writes delays (ns, by slave) and offsets so that all slaves show the first one's time, which
 /// starts at `epoch`; their clocks' control loops begin anew. `slaves` have clocks.

@@ -55,13 +55,11 @@ MasterConfig CompleteMasterConfig(MasterConfig config, const robot::RobotModel& 
     const int joint = model.FindJoint(drive.joint());
     if (joint < 0) {
       throw EthercatError(
-          fmt::format("EtherCAT configuration: drive \"{}\": robot \"{}\" has no "
-                      "joint of that name",
-                      drive.joint(), model.name()));
+          "EtherCAT configuration: drive \"{}\": robot \"{}\" has no joint of that name",
+          drive.joint(), model.name());
     }
     if (has_drive[static_cast<size_t>(joint)]) {
-      throw EthercatError(
-          fmt::format("EtherCAT configuration: joint \"{}\" has two drives", drive.joint()));
+      throw EthercatError("EtherCAT configuration: joint \"{}\" has two drives", drive.joint());
     }
     has_drive[static_cast<size_t>(joint)] = true;
 
@@ -69,10 +67,10 @@ MasterConfig CompleteMasterConfig(MasterConfig config, const robot::RobotModel& 
     const double current = motor.rated_current * 1e3;                         // mA
     const double torque = motor.torque_constant * motor.rated_current * 1e3;  // mN·m
     if (!(current >= 1) || !(torque >= 1)) {
-      throw EthercatError(fmt::format(
-          "joint \"{}\": its motor needs a rated_current of at least 1 mA, and a "
-          "torque_constant that makes at least 1 mN·m of it, in the robot's description",
-          drive.joint()));
+      throw EthercatError(
+          "joint \"{}\": its motor needs a rated_current of at least 1 mA, and a torque_constant "
+          "that makes at least 1 mN·m of it, in the robot's description",
+          drive.joint());
     }
     if (!drive.has_rated_current()) {
       drive.set_rated_current(static_cast<uint32_t>(std::lround(current)));
@@ -85,16 +83,16 @@ MasterConfig CompleteMasterConfig(MasterConfig config, const robot::RobotModel& 
     }
     if (std::abs(drive.rated_current() - current) > 0.01 * current ||
         std::abs(drive.rated_torque() - torque) > 0.01 * torque) {
-      throw EthercatError(fmt::format(
+      throw EthercatError(
           "EtherCAT configuration: drive \"{}\": rated for {} mN·m at {} mA, the robot's motor for "
           "{:.0f} mN·m at {:.0f} mA",
-          drive.joint(), drive.rated_torque(), drive.rated_current(), torque, current));
+          drive.joint(), drive.rated_torque(), drive.rated_current(), torque, current);
     }
   }
   for (int j = 0; j < model.num_joints(); ++j) {
     if (!has_drive[static_cast<size_t>(j)]) {
-      throw EthercatError(fmt::format("EtherCAT configuration: joint \"{}\" has no drive",
-                                      model.joints()[static_cast<size_t>(j)].name));
+      throw EthercatError("EtherCAT configuration: joint \"{}\" has no drive",
+                          model.joints()[static_cast<size_t>(j)].name);
     }
   }
   return config;
@@ -152,10 +150,10 @@ void EthercatDriveBus::FindReadings(const MasterConfig& config, size_t num_feet)
           reading.quantity() == SensorReading::FORCE || reading.quantity() == SensorReading::MOMENT;
       if (!place || (of_foot && reading.foot() >= num_feet) ||
           (reading.is_float() && place->bits != 32)) {
-        throw EthercatError(fmt::format(
+        throw EthercatError(
             "EtherCAT configuration: other \"{}\": reading of {:04X}:{:02X}: give an object of its "
             "tx, and a foot of the robot; is_float takes 32 bits",
-            config.other(i).name(), reading.index(), reading.subindex()));
+            config.other(i).name(), reading.index(), reading.subindex());
       }
       (of_foot ? sensors_.feet : sensors_.imu) = true;
       readings_.push_back({*place, reading});
@@ -166,10 +164,11 @@ void EthercatDriveBus::FindReadings(const MasterConfig& config, size_t num_feet)
 void EthercatDriveBus::Diagnose(bus_status_t* status) const {
   const Attendant* attendant = master_.attendant();
   for (size_t i = 0; i < master_.num_slaves(); ++i) {
-    const SlaveDiagnosis slave = attendant != nullptr ? attendant->diagnosis(i) : SlaveDiagnosis{};
+    static const SlaveDiagnosis kNone;  // of a chain that nobody looks after
+    const SlaveDiagnosis& slave = attendant != nullptr ? attendant->diagnosis(i) : kNone;
     status->online[i] = slave.online ? 1 : 0;
-    status->al_status[i] = slave.al_status;
-    status->al_code[i] = slave.al_code;
+    status->al_status[i] = slave.al_status();
+    status->al_code[i] = slave.al_code();
     status->error_code[i] = slave.error_code;
     status->emergency[i] = slave.emergency;
     status->emergencies[i] = slave.emergencies;

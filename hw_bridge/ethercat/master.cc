@@ -16,7 +16,7 @@ constexpr uint16_t kEventMask = 0x0004;   // AL events in each datagram, as othe
 const MasterConfig& Checked(const MasterConfig& config) {
   CheckFields(config, "master.");
   const auto require = [](bool condition, std::string_view problem) {
-    if (!condition) throw EthercatError(fmt::format("EtherCAT configuration: {}", problem));
+    if (!condition) throw EthercatError("EtherCAT configuration: {}", problem);
   };
   const auto own_profile = [](const DriveConfig& drive) { return drive.has_profile(); };
   require(config.has_profile() ||
@@ -60,9 +60,9 @@ void Master::PlaceSlaves() {
     const OtherSlave& other = config_.other(i);
     if (other.position() >= static_cast<uint32_t>(count) || taken[other.position()]) {
       throw EthercatError(
-          fmt::format("EtherCAT configuration: other \"{}\": position {} is taken or beyond the "
-                      "last of {} slaves",
-                      other.name(), other.position(), count));
+          "EtherCAT configuration: other \"{}\": position {} is taken or beyond the last of {} "
+          "slaves",
+          other.name(), other.position(), count);
     }
     taken[other.position()] = true;
     positions_[static_cast<size_t>(config_.drive_size() + i)] = static_cast<int>(other.position());
@@ -71,11 +71,18 @@ void Master::PlaceSlaves() {
     while (taken[at]) ++at;
     positions_[i] = static_cast<int>(at);
   }
+  MakeSlaves();
+}
+
+SlaveAccess Master::SlaveAt(int position, const std::string& name) {
+  return {&transactions_, timeouts_, position, static_cast<uint16_t>(kFirstStation + position),
+          name};
+}
+
+void Master::MakeSlaves() {
   slaves_.clear();
   for (size_t i = 0; i < positions_.size(); ++i) {
-    slaves_.emplace_back(&transactions_, timeouts_, positions_[i],
-                         static_cast<uint16_t>(kFirstStation + positions_[i]));
-    slaves_.back().set_name(setup_.NameOf(i));
+    slaves_.push_back(SlaveAt(positions_[i], setup_.slave(i).name));
   }
 }
 
@@ -114,13 +121,13 @@ void Master::CheckCount() {
   if (static_cast<size_t>(*found) == num_slaves()) return;
   const auto missing = static_cast<int>(std::find(positions_.begin(), positions_.end(), *found) -
                                         positions_.begin());
-  throw EthercatError(fmt::format(
+  throw EthercatError(
       "the EtherCAT bus has {} slaves, the configuration {} drives{} (the first without a slave: "
       "{}); check cables and power, or the list of drives",
       *found, num_drives(),
       config_.other_size() > 0 ? fmt::format(" and {} others", config_.other_size()) : "",
-      static_cast<size_t>(missing) < num_slaves() ? setup_.NameOf(static_cast<size_t>(missing))
-                                                  : "none"));
+      static_cast<size_t>(missing) < num_slaves() ? setup_.slave(static_cast<size_t>(missing)).name
+                                                  : "none");
 }
 
 void Master::ResetAndAddress() {
@@ -130,8 +137,8 @@ void Master::ResetAndAddress() {
     const auto counter =
         transactions_.Execute(Command::kBwr, 0, address, std::span(bytes).first(data.size()));
     if (!counter || (all && *counter != num_slaves())) {
-      throw EthercatError(fmt::format("writing register 0x{:04X} reached {} of {} slaves", address,
-                                      counter.value_or(0), num_slaves()));
+      throw EthercatError("writing register 0x{:04X} reached {} of {} slaves", address,
+                          counter.value_or(0), num_slaves());
     }
   };
   constexpr std::array<uint8_t, kNumFmmus * kFmmuSize> kZeros{};
@@ -154,37 +161,22 @@ void Master::ResetAndAddress() {
   broadcast(reg::kSyncManager, zeros(kNumSyncManagers * kSyncManagerSize), false);
   broadcast(reg::kEepromConfig, kForce, true);
   broadcast(reg::kEepromConfig, kMaster, true);
-  for (const SlaveAccess& slave : slaves_) {
-    std::array<uint8_t, 2> station{};
-    Put<uint16_t>(station, 0, slave.station());
-    const auto counter =
-        transactions_.Execute(Command::kApwr, AutoIncrementAddress(slave.station() - kFirstStation),
-                              reg::kStationAddress, station);
-    if (!counter || *counter != 1) {
-      throw EthercatError(fmt::format("{}: does not take its station address; is the chain whole?",
-                                      slave.Describe()));
-    }
+  for (SlaveAccess& slave : slaves_) {
+    if (!slave.AssignStation())
+      slave.Fail("does not take its station address; is the chain whole?");
   }
   for (SlaveAccess& slave : slaves_) slave.AwaitInit();
 }
 
 void Master::FindWiring() {
   // Until positions are known, names may be another's: the place in the chain is what counts.
-  const size_t count = num_slaves();
-  std::array<uint8_t, 4> latch{};
-  static_cast<void>(transactions_.Execute(Command::kBwr, 0, reg::kDcReceiveTime, latch));
-  std::vector<SlavePorts> ports(count);
-  std::vector<std::string> names(count);
-  for (size_t i = 0; i < count; ++i) {
+  LatchClocks(&transactions_);
+  std::vector<SlavePorts> ports(num_slaves());
+  std::vector<std::string> names(num_slaves());
+  for (size_t i = 0; i < num_slaves(); ++i) {
     const auto at = static_cast<size_t>(positions_[i]);
-    SlaveAccess& slave = slaves_[i];
-    names[at] = slave.Describe();
-    ports[at].dl_status = slave.Read<uint16_t>(reg::kDlStatus);
-    ports[at].has_times = HasClock(&slave);
-    for (size_t port = 0; ports[at].has_times && port < kNumPorts; ++port) {
-      ports[at].times[port] =
-          slave.Read<uint32_t>(static_cast<uint16_t>(reg::kDcReceiveTime + 4 * port));
-    }
+    names[at] = slaves_[i].Describe();
+    ports[at] = slaves_[i].ReadPorts();
   }
   wiring_ =
       FindTopology(ports, [&names](int position) { return names[static_cast<size_t>(position)]; });
@@ -198,10 +190,9 @@ void Master::FindPositions() {
   std::vector<Wanted> wanted;
   bool all = true;
   for (size_t i = 0; i < num_slaves(); ++i) {
-    const auto identification = setup_.IdentificationOf(i);
-    const auto alias = setup_.AliasOf(i);
-    wanted.push_back({identification ? identification : alias,
-                      identification ? "identification" : "station alias"});
+    const ConfiguredSlave& slave = setup_.slave(i);
+    wanted.push_back({slave.identification ? slave.identification : slave.alias,
+                      slave.identification ? "identification" : "station alias"});
     all = all && wanted.back().number.has_value();
   }
   const auto read = [this](SlaveAccess& slave, std::string_view what) -> std::optional<uint32_t> {
@@ -214,18 +205,16 @@ void Master::FindPositions() {
       if (!wanted[i].number) continue;
       const auto found = read(slaves_[i], wanted[i].what);
       if (found == wanted[i].number) continue;
-      throw EthercatError(fmt::format(
-          "{}: its {} is {}, the configuration says {}; is this the right drive at this place?",
-          slaves_[i].Describe(), wanted[i].what, found ? std::to_string(*found) : "not given",
-          *wanted[i].number));
+      slaves_[i].Fail(
+          "its {} is {}, the configuration says {}; is this the right drive at this place?",
+          wanted[i].what, found ? std::to_string(*found) : "not given", *wanted[i].number);
     }
     return;
   }
   // Every slave says who it is: where it is in the chain does not matter.
   std::vector<int> places(num_slaves(), -1);
   for (size_t at = 0; at < num_slaves(); ++at) {
-    SlaveAccess here(&transactions_, timeouts_, static_cast<int>(at),
-                     static_cast<uint16_t>(kFirstStation + at));
+    SlaveAccess here = SlaveAt(static_cast<int>(at), "");
     bool known = false;
     for (size_t i = 0; i < num_slaves() && !known; ++i) {
       if (places[i] >= 0 || read(here, wanted[i].what) != wanted[i].number) continue;
@@ -234,16 +223,12 @@ void Master::FindPositions() {
     }
     if (known) continue;
     const auto found = read(here, wanted[0].what);
-    throw EthercatError(fmt::format(
-        "{}: its {} is {}, which no slave of the configuration has (or one that was found before)",
-        here.Describe(), wanted[0].what, found ? std::to_string(*found) : "not given"));
+    here.Fail(
+        "its {} is {}, which no slave of the configuration has (or one that was found before)",
+        wanted[0].what, found ? std::to_string(*found) : "not given");
   }
   positions_ = places;
-  for (size_t i = 0; i < num_slaves(); ++i) {
-    slaves_[i] = SlaveAccess(&transactions_, timeouts_, places[i],
-                             static_cast<uint16_t>(kFirstStation + places[i]));
-    slaves_[i].set_name(setup_.NameOf(i));
-  }
+  MakeSlaves();
 }
 
 void Master::SetUpDistributedClocks() {
@@ -255,12 +240,10 @@ void Master::SetUpDistributedClocks() {
     const auto i = static_cast<size_t>(
         std::find(positions_.begin(), positions_.end(), static_cast<int>(at)) - positions_.begin());
     clocks_.delays[i] = wiring_[at].delay;
-    clocks_.has_clock[i] = HasClock(&slaves_[i]);
+    clocks_.has_clock[i] = slaves_[i].HasClock();
     if (!clocks_.has_clock[i]) {
-      if (!setup_.is_drive(i)) continue;
-      throw EthercatError(
-          fmt::format("{}: has no 64-bit distributed clock; set distributed_clocks: false",
-                      slaves_[i].Describe()));
+      if (setup_.slave(i).drive == nullptr) continue;
+      slaves_[i].Fail("has no 64-bit distributed clock; set distributed_clocks: false");
     }
     if (with_clock.empty()) clocks_.reference = i;
     with_clock.push_back(&slaves_[i]);
@@ -290,9 +273,9 @@ void Master::AwaitClocks() {
       const int32_t difference = DcDifference(slaves_[i].Read<uint32_t>(reg::kDcDifference));
       if (std::abs(int64_t{difference}) <= config_.clock_tolerance()) break;
       if (transactions_.link()->Now() > deadline) {
-        throw EthercatError(fmt::format(
-            "{}: its clock is still {} ns off the common time (register 0x092C), {} are allowed",
-            slaves_[i].Describe(), difference, config_.clock_tolerance()));
+        slaves_[i].Fail(
+            "its clock is still {} ns off the common time (register 0x092C), {} are allowed",
+            difference, config_.clock_tolerance());
       }
       for (int frame = 0; frame < 10; ++frame) compensate();
     }
@@ -327,16 +310,16 @@ void Master::GoOperational() {
     const CycleResult result = Pace();
     if (result.complete) return;
     if (transactions_.link()->Now() > deadline) {
-      throw EthercatError(fmt::format(
+      throw EthercatError(
           "the process data's working counter is {} instead of {} although all slaves are in OP",
-          result.working_counter, result.expected_working_counter));
+          result.working_counter, result.expected_working_counter);
     }
   }
 }
 
 void Master::Attend(bool lockstep, Attendant::Say say) {
-  attendant_ = std::make_unique<Attendant>(&config_, &setup_, clocks_, slaves_, positions_,
-                                           timeouts_, lockstep, std::move(say));
+  attendant_ = std::make_unique<Attendant>(&config_, &setup_, clocks_, slaves_, timeouts_, lockstep,
+                                           std::move(say));
 }
 
 bool Master::Stop() {
@@ -371,10 +354,17 @@ bool Master::Stop() {
   return false;
 }
 
-uint16_t Master::Expected(Exchange exchange) const {
-  return exchange == Exchange::kReadWrite ? image_.expected_read_write()
-         : exchange == Exchange::kRead    ? image_.expected_read()
-                                          : image_.expected_write();
+Master::Cyclic Master::CyclicOf(Exchange exchange) const {
+  const size_t outputs = image_.outputs_size();
+  switch (exchange) {
+    case Exchange::kRead:
+      return {Command::kLrd, outputs, image_.size() - outputs, image_.expected_read()};
+    case Exchange::kWrite:
+      return {Command::kLwr, 0, outputs, image_.expected_write()};
+    case Exchange::kReadWrite:
+      break;
+  }
+  return {Command::kLrw, 0, image_.size(), image_.expected_read_write()};
 }
 
 bool Master::Send(Exchange exchange) {
@@ -395,19 +385,9 @@ bool Master::Send(Exchange exchange) {
 
   cyclic_index_ = transactions_.NextIndex();
   builder_.Clear();
-  const std::span<const uint8_t> image(image_bytes_);
-  switch (exchange) {
-    case Exchange::kReadWrite:
-      builder_.AddLogical(Command::kLrw, cyclic_index_, kLogicalStart, image);
-      break;
-    case Exchange::kRead:
-      builder_.AddLogical(Command::kLrd, cyclic_index_,
-                          kLogicalStart + static_cast<uint32_t>(outputs), image.subspan(outputs));
-      break;
-    case Exchange::kWrite:
-      builder_.AddLogical(Command::kLwr, cyclic_index_, kLogicalStart, image.first(outputs));
-      break;
-  }
+  const Cyclic cyclic = CyclicOf(exchange);
+  builder_.AddLogical(cyclic.command, cyclic_index_, cyclic.address(),
+                      std::span<const uint8_t>(image_bytes_).subspan(cyclic.begin, cyclic.size));
   builder_.AddZero(Command::kBrd, cyclic_index_, 0, reg::kAlStatus, 2);
   if (clocks_.running) {
     // The reference puts its time in. Should it not be there, the others are told what it would be.
@@ -440,7 +420,7 @@ bool Master::Send(Exchange exchange) {
 
 CycleResult Master::Receive(int64_t deadline) {
   CycleResult result;
-  result.expected_working_counter = Expected(exchange_);
+  result.expected_working_counter = CyclicOf(exchange_).working_counter;
   FrameCounts& counts = *transactions_.mutable_counts();
   // However many strangers' frames there are, a cycle looks at so many only.
   constexpr int kMostFrames = 64;
@@ -472,21 +452,12 @@ bool Master::Take(const FrameReader& frame, CycleResult* result) {
   const Datagram data = *reader.Next();
   const Datagram status = *reader.Next();
   const std::optional<Datagram> clock = clocks_.running ? reader.Next() : std::nullopt;
-  const bool read = exchange_ != Exchange::kWrite;
+  const Cyclic cyclic = CyclicOf(exchange_);
   const size_t outputs = image_.outputs_size();
-  // Where the inputs begin in this datagram.
-  const size_t inputs_at = exchange_ == Exchange::kReadWrite ? outputs : 0;
-  const size_t size = exchange_ == Exchange::kReadWrite ? image_.size()
-                      : read                            ? image_.size() - outputs
-                                                        : outputs;
-  const Command command = exchange_ == Exchange::kReadWrite ? Command::kLrw
-                          : read                            ? Command::kLrd
-                                                            : Command::kLwr;
-  const uint32_t address =
-      kLogicalStart + static_cast<uint32_t>(exchange_ == Exchange::kRead ? outputs : 0);
-  if (data.index != cyclic_index_ || data.command != command || data.logical_address() != address ||
-      data.data.size() != size || status.index != cyclic_index_ ||
-      status.command != Command::kBrd || status.ado != reg::kAlStatus || status.data.size() != 2 ||
+  if (data.index != cyclic_index_ || data.command != cyclic.command ||
+      data.logical_address() != cyclic.address() || data.data.size() != cyclic.size ||
+      status.index != cyclic_index_ || status.command != Command::kBrd ||
+      status.ado != reg::kAlStatus || status.data.size() != 2 ||
       (clock && (clock->index != cyclic_index_ || clock->command != Command::kFrmw ||
                  clock->ado != reg::kDcSystemTime || clock->data.size() != 8))) {
     return false;
@@ -510,9 +481,10 @@ bool Master::Take(const FrameReader& frame, CycleResult* result) {
   }
   if (!result->complete) {
     ++short_working_counters_;
-  } else if (read) {
+  } else if (exchange_ != Exchange::kWrite) {
     // The image's inputs alone: Get() looks at nothing else.
-    std::copy(data.data.begin() + static_cast<std::ptrdiff_t>(inputs_at), data.data.end(),
+    const std::span<const uint8_t> inputs = data.data.subspan(outputs - cyclic.begin);
+    std::copy(inputs.begin(), inputs.end(),
               image_bytes_.begin() + static_cast<std::ptrdiff_t>(outputs));
     for (size_t i = 0; i < inputs_.size(); ++i) inputs_[i] = image_.Get(i, image_bytes_);
   }

@@ -42,7 +42,6 @@ class Master {
   size_t num_drives() const { return outputs_.size(); }
   /// The drives, then the others.
   size_t num_slaves() const { return slaves_.size(); }
-  const SlaveSetup& setup() const { return setup_; }
   const ProcessImage& image() const { return image_; }
 
   /// Number of slaves that answer a broadcast read of the AL status; nullopt: no frame came back.
@@ -92,6 +91,9 @@ class Master {
   void FindWiring();
   void FindPositions();
   void PlaceSlaves();
+  SlaveAccess SlaveAt(int position, const std::string& name);
+  /// The slaves as positions_ has them.
+  void MakeSlaves();
   void SetUpDistributedClocks();
   void AwaitClocks();
   void GoOperational();
@@ -99,7 +101,14 @@ class Master {
   CycleResult Pace();
   bool Take(const FrameReader& reader, CycleResult* result);
   bool TakeAcyclic(FrameReader* reader);
-  uint16_t Expected(Exchange exchange) const;
+  /// The cyclic datagram: which part of the image, and the working counter when all take part.
+  struct Cyclic {
+    Command command;
+    size_t begin, size;
+    uint16_t working_counter;
+    uint32_t address() const { return kLogicalStart + static_cast<uint32_t>(begin); }
+  };
+  Cyclic CyclicOf(Exchange exchange) const;
 
   MasterConfig config_;
   ProcessImage image_;

@@ -37,9 +37,8 @@ void Require(std::initializer_list<uint16_t> needed, std::string_view pdo, const
   for (const uint16_t index : needed) {
     if (direction.Find(index) != nullptr) continue;
     throw EthercatError(
-        fmt::format("drive profile \"{}\": {} lacks object {:04X}, without which no torque is "
-                    "controlled",
-                    profile, pdo, index));
+        "drive profile \"{}\": {} lacks object {:04X}, without which no torque is controlled",
+        profile, pdo, index);
   }
 }
 
@@ -59,19 +58,17 @@ ProcessImage::Direction ProcessImage::MakeDirection(const DriveProfile& profile,
   for (const MappedObject& object : rx ? profile.rx() : profile.tx()) {
     if (object.has_pdo()) pdo = object.pdo();
     if (pdo < base || pdo > base + 0x1FF) {
-      throw EthercatError(
-          fmt::format("drive profile \"{}\": {}_pdo 0x{:04X} is not in {:04X}-{:04X}",
-                      profile.name(), rx ? "rx" : "tx", pdo, base, base + 0x1FF));
+      throw EthercatError("drive profile \"{}\": {}_pdo 0x{:04X} is not in {:04X}-{:04X}",
+                          profile.name(), rx ? "rx" : "tx", pdo, base, base + 0x1FF);
     }
     const auto index = static_cast<uint16_t>(object.index());
     const int standard = StandardBits(index);
     const bool aligned = standard == 0 || direction.bits % 8 == 0;
     if (!aligned || (standard != 0 && static_cast<int>(object.bits()) != standard)) {
       throw EthercatError(
-          fmt::format("drive profile \"{}\": object {:04X}:{:02X} of {} bits cannot be mapped{}",
-                      profile.name(), object.index(), object.subindex(), object.bits(),
-                      aligned ? fmt::format("; CiA 402 gives it {}", standard)
-                              : "; it must begin with a byte"));
+          "drive profile \"{}\": object {:04X}:{:02X} of {} bits cannot be mapped{}",
+          profile.name(), object.index(), object.subindex(), object.bits(),
+          aligned ? fmt::format("; CiA 402 gives it {}", standard) : "; it must begin with a byte");
     }
     const auto own = static_cast<uint16_t>(pdo);
     if (direction.pdos.empty() || direction.pdos.back() != own) direction.pdos.push_back(own);
@@ -83,9 +80,9 @@ ProcessImage::Direction ProcessImage::MakeDirection(const DriveProfile& profile,
     direction.bits += object.bits();
   }
   if (direction.bits % 8 != 0) {
-    throw EthercatError(fmt::format(
+    throw EthercatError(
         "drive profile \"{}\": {} has {} bits, which are no whole bytes; add a gap (index 0)",
-        profile.name(), rx ? "rx" : "tx", direction.bits));
+        profile.name(), rx ? "rx" : "tx", direction.bits);
   }
   return direction;
 }
@@ -119,9 +116,8 @@ ProcessImage::ProcessImage(const MasterConfig& config) {
   constexpr size_t kOthers = 2 * kDatagramOverhead + 2 + 8;
   constexpr size_t kRoom = kMaxDatagramData - kOthers;
   if (size() > kRoom) {
-    throw EthercatError(
-        fmt::format("{} slaves with {} bytes each do not fit one frame; at most {} do",
-                    num_slaves(), size() / num_slaves(), kRoom / (size() / num_slaves())));
+    throw EthercatError("{} slaves with {} bytes each do not fit one frame; at most {} do",
+                        num_slaves(), size() / num_slaves(), kRoom / (size() / num_slaves()));
   }
 }
 
@@ -134,61 +130,34 @@ bool ProcessImage::Reports(size_t slave, uint16_t index) const {
 
 void ProcessImage::Put(size_t slave, const DriveOutputs& outputs, std::span<uint8_t> image) const {
   const std::span<uint8_t> bytes = image.subspan(outputs_at(slave), outputs_of(slave));
-  for (const Entry& entry : slaves_[slave].rx.entries) {
-    int64_t value = 0;
-    switch (entry.index) {
-      case object::kControlword:
-        value = outputs.controlword;
-        break;
-      case object::kModeOfOperation:
-        value = outputs.mode;
-        break;
-      case object::kTargetTorque:
-        value = outputs.target_torque;
-        break;
-      case object::kMaxTorque:
-        value = outputs.max_torque;
-        break;
-      case object::kTargetPosition:
-        value = outputs.target_position;
-        break;
-      case object::kTargetVelocity:
-        value = outputs.target_velocity;
-        break;
-      default:
-        continue;  // mapped, but nothing the bridge has a value for: it stays zero
+  // What else is mapped stays zero.
+  const auto put = [&](uint16_t index, int64_t value) {
+    for (const Entry& entry : slaves_[slave].rx.entries) {
+      if (entry.index != index) continue;
+      PutSized(bytes, entry.bit / 8, static_cast<uint64_t>(value), entry.bits / 8U);
     }
-    PutSized(bytes, entry.bit / 8, static_cast<uint64_t>(value), entry.bits / 8U);
-  }
+  };
+  put(object::kControlword, outputs.controlword);
+  put(object::kModeOfOperation, outputs.mode);
+  put(object::kTargetTorque, outputs.target_torque);
+  put(object::kMaxTorque, outputs.max_torque);
 }
 
 DriveInputs ProcessImage::Get(size_t slave, std::span<const uint8_t> image) const {
   const std::span<const uint8_t> bytes = image.subspan(inputs_at(slave), inputs_of(slave));
   DriveInputs inputs;
   inputs.mode = kModeCyclicTorque;
-  for (const Entry& entry : slaves_[slave].tx.entries) {
-    if (StandardBits(entry.index) == 0) continue;
-    const uint64_t value = GetSized(bytes, entry.bit / 8, entry.bits / 8U);
-    switch (entry.index) {
-      case object::kStatusword:
-        inputs.statusword = static_cast<uint16_t>(value);
-        break;
-      case object::kModeDisplay:
-        inputs.mode = static_cast<int8_t>(value);
-        break;
-      case object::kPosition:
-        inputs.position = static_cast<int32_t>(value);
-        break;
-      case object::kVelocity:
-        inputs.velocity = static_cast<int32_t>(value);
-        break;
-      case object::kTorque:
-        inputs.torque = static_cast<int16_t>(value);
-        break;
-      default:
-        break;
-    }
-  }
+  const auto get = [&](uint16_t index, auto* value) {
+    const Entry* entry = slaves_[slave].tx.Find(index);
+    if (entry == nullptr) return;
+    using Value = std::remove_pointer_t<decltype(value)>;
+    *value = static_cast<Value>(GetSized(bytes, entry->bit / 8, sizeof(Value)));
+  };
+  get(object::kStatusword, &inputs.statusword);
+  get(object::kModeDisplay, &inputs.mode);
+  get(object::kPosition, &inputs.position);
+  get(object::kVelocity, &inputs.velocity);
+  get(object::kTorque, &inputs.torque);
   return inputs;
 }
 
@@ -236,11 +205,10 @@ void ProcessImage::ConfigureDirection(const Direction& direction, uint16_t assig
   for (const uint16_t pdo : direction.pdos) access->Download({assign, ++count}, pdo, 2);
   access->Download({assign, 0}, count, 1);
   if (!Mapped(direction, assign, access)) {
-    throw EthercatError(
-        fmt::format("{}: {} the mapping of PDO {:04X}{}", access->Describe(),
-                    fixed ? "its own mapping is another than" : "accepts", direction.pdos.front(),
-                    fixed ? " in the configuration; `poise drives scan` writes what it has"
-                          : " but does not keep it; does the drive allow that PDO to be mapped?"));
+    access->Fail("{} the mapping of PDO {:04X}{}",
+                 fixed ? "its own mapping is another than" : "accepts", direction.pdos.front(),
+                 fixed ? " in the configuration; `poise drives scan` writes what it has"
+                       : " but does not keep it; does the drive allow that PDO to be mapped?");
   }
 }
 

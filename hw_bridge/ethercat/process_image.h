@@ -41,7 +41,6 @@ struct DriveOutputs {
   int8_t mode = kModeCyclicTorque;
   int16_t target_torque = 0;  ///< per mille of rated
   uint16_t max_torque = 0;    ///< per mille of rated
-  int32_t target_position = 0, target_velocity = 0;
 };
 
 /// What a drive reports in a cycle.

@@ -12,7 +12,7 @@ inline constexpr uint16_t kFmmuCount = 0x0004;
 inline constexpr uint16_t kSyncManagerCount = 0x0005;
 inline constexpr uint16_t kRamSize = 0x0006;  ///< KiB
 inline constexpr uint16_t kPortDescriptor = 0x0007;
-inline constexpr uint16_t kFeatures = 0x0008;  ///< bit 2: distributed clocks, bit 3: 64 bits wide
+inline constexpr uint16_t kFeatures = 0x0008;
 inline constexpr uint16_t kStationAddress = 0x0010;
 inline constexpr uint16_t kStationAlias = 0x0012;
 inline constexpr uint16_t kDlControl = 0x0100;     ///< bit 0: frames of other types are destroyed
@@ -53,6 +53,8 @@ inline constexpr uint16_t kDcStart = 0x0990;
 inline constexpr uint16_t kDcSync0Cycle = 0x09A0;
 inline constexpr uint16_t kRam = 0x1000;  ///< start of the process data RAM
 }  // namespace reg
+
+inline constexpr uint8_t kFeatureClock = 0x04, kFeature64Bits = 0x08;  ///< distributed clock
 
 inline constexpr int kNumPorts = 4;
 inline constexpr int kNumFmmus = 8;

@@ -1,14 +1,38 @@
-// All of one slave: registers, states, EEPROM, and the objects behind its mailbox (CoE).
+// All of one slave: registers, states and EEPROM by its configured station address, and the objects
+// behind its mailbox (CoE).
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "hw_bridge/ethercat/coe.h"
-#include "hw_bridge/ethercat/slave_registers.h"
+#include "hw_bridge/ethercat/links/bytes.h"
+#include "hw_bridge/ethercat/links/link.h"
+#include "hw_bridge/ethercat/registers.h"
+#include "hw_bridge/ethercat/topology.h"
+#include "hw_bridge/ethercat/transactions.h"
 
 namespace poise::ethercat {
+
+/// What a slave's EEPROM says that it is.
+struct Identity {
+  uint32_t vendor = 0, product = 0, revision = 0, serial = 0;
+};
+
+/// A sync manager as the EEPROM's category 41 has it.
+struct SyncManagerEntry {
+  uint16_t start = 0, length = 0;
+  uint8_t control = 0;
+  uint8_t type = 0;  ///< 1, 2: mailbox out, in; 3, 4: process data out, in; 0: not used or not said
+};
+
+struct Timeouts {
+  int64_t eeprom = 0, mailbox = 0, state = 0;  ///< ns
+};
 
 /// Address and size, bytes, of a mailbox in the slave's memory.
 struct MailboxArea {
@@ -27,9 +51,97 @@ class SdoAbortError : public EthercatError {
 
 /// Acyclic access to one slave. Everything that fails throws EthercatError naming the slave, what
 /// was asked of it and what it answered.
-class SlaveAccess : public SlaveRegisters {
+class SlaveAccess {
  public:
-  using SlaveRegisters::SlaveRegisters;
+  SlaveAccess(Transactions* transactions, const Timeouts& timeouts, int position, uint16_t station,
+              std::string name = "")
+      : transactions_(transactions),
+        timeouts_(timeouts),
+        position_(position),
+        station_(station),
+        name_(std::move(name)) {}
+
+  /// "slave 3 (station 1003, left_knee_pitch)"
+  std::string Describe() const;
+  uint16_t station() const { return station_; }
+
+  void Read(uint16_t address, std::span<uint8_t> data);
+  void Write(uint16_t address, std::span<const uint8_t> data);
+  template <class T>
+  T Read(uint16_t address) {
+    std::array<uint8_t, sizeof(T)> bytes{};
+    Read(address, bytes);
+    return Get<T>(bytes, 0);
+  }
+  template <class T>
+  void Write(uint16_t address, std::type_identity_t<T> value) {
+    std::array<uint8_t, sizeof(T)> bytes{};
+    Put<T>(bytes, 0, value);
+    Write(address, bytes);
+  }
+
+  /// Gives the slave at its place in the chain its station address. False: nobody has taken it.
+  bool AssignStation();
+  /// The station address of who is at its place, by one frame; nullopt: nobody answers.
+  std::optional<uint16_t> FindStation();
+  /// Whether it has a 64-bit distributed clock.
+  bool HasClock();
+  /// Where it is wired, and when the last latching write (LatchClocks) passed.
+  SlavePorts ReadPorts();
+  /// Switches a sync manager on. `control`: kSm*.
+  void SetSyncManager(int manager, uint16_t start, uint16_t size, uint8_t control);
+
+  /// A 32-bit value of the EEPROM at a word address. Takes the EEPROM from the slave's application.
+  uint32_t ReadEeprom(uint16_t word);
+  /// Hands the EEPROM over to the slave's application, which may need it on its way to PRE-OP.
+  void ReleaseEeprom();
+  Identity ReadIdentity();
+  /// The device's name in the EEPROM, as it stands there; empty: it has none.
+  std::string ReadName();
+  /// By number, from the EEPROM; all zero where it has none.
+  std::array<SyncManagerEntry, kNumSyncManagers> ReadSyncManagers();
+  /// The number that the slave gives when it is asked for its identification (ETG.1020: AL control
+  /// bit 5, answered in the AL status code); nullopt: it has none. In INIT or PRE-OP.
+  std::optional<uint16_t> ReadIdentification();
+
+  struct AlStatus {
+    AlState state = AlState::kInit;
+    bool error = false;
+    uint16_t code = 0;
+  };
+  AlStatus ReadAlStatus();
+  /// "SAFE-OP with error 0x001B (sync manager watchdog)"
+  static std::string Text(const AlStatus& status);
+  /// Requests a state without waiting for it. An error is acknowledged first, and the request
+  /// follows once the slave has taken the acknowledgement back; `meanwhile` runs between looks.
+  template <class Meanwhile>
+  void RequestState(AlState state, Meanwhile meanwhile) {
+    const int64_t deadline = Now() + timeouts_.state;
+    while (!TryRequest(state, deadline)) meanwhile();
+  }
+  void RequestState(AlState state) {
+    RequestState(state, [this] { Pause(); });
+  }
+  /// Waits for INIT from whatever state, for which an error from before is no obstacle.
+  void AwaitInit();
+  /// Waits for the state; `meanwhile` runs between looks. Throws with the AL status code's name
+  /// when the slave refuses, or at the timeout.
+  template <class Meanwhile>
+  void AwaitState(AlState state, Meanwhile meanwhile) {
+    const int64_t deadline = Now() + timeouts_.state;
+    while (!StateReached(state, deadline)) meanwhile();
+  }
+  /// Lets a little time pass between two looks at the bus.
+  void Pause();
+  void ChangeState(AlState state) {
+    RequestState(state);
+    AwaitState(state, [this] { Pause(); });
+  }
+  /// Throws EthercatError: the slave, and a problem of fmt's pattern.
+  template <class... Args>
+  [[noreturn]] void Fail(fmt::format_string<Args...> problem, Args&&... args) const {
+    throw EthercatError("{}: {}", Describe(), fmt::format(problem, std::forward<Args>(args)...));
+  }
 
   /// The same slave, with all that is known of it, through other transactions.
   SlaveAccess Through(Transactions* transactions) const {
@@ -56,14 +168,34 @@ class SlaveAccess : public SlaveRegisters {
   int64_t emergencies() const { return emergencies_; }
 
  private:
+  void Transfer(Command command, uint16_t address, std::span<uint8_t> data);
+  int64_t Now() const { return transactions_->link()->Now(); }
+  /// The first word of the EEPROM behind the header, and the number of words.
+  struct Category {
+    uint16_t word;
+    uint32_t words;
+  };
+  std::optional<Category> FindCategory(uint16_t wanted);
+  bool StateReached(AlState state, int64_t deadline);
+  bool TryRequest(AlState state, int64_t deadline);
+  /// False: the slave has not yet taken what was written there before.
+  bool WriteAlControl(uint8_t control);
+  /// Waits until the EEPROM is not busy; the error bits it then shows.
+  uint16_t AwaitEeprom(uint16_t word);
+
   /// Sends a request and waits for its answer, which points into received_. Throws SdoAbortError.
   Sdo Exchange(const Sdo& request, const std::string& what);
-  /// The next CoE message that is no emergency, which is kept.
-  CoeMessage ReceiveCoe(int64_t deadline, const std::string& what);
   /// What the mailbox holds, when it is CoE and new; an emergency is kept and none is returned.
   std::optional<CoeMessage> TakeReceived(const std::string& what);
   void SendMailbox(std::span<uint8_t> mailbox, int64_t deadline, const std::string& what);
   void ReceiveMailbox(int64_t deadline, const std::string& what);
+
+  Transactions* transactions_;
+  Timeouts timeouts_;
+  int position_;
+  uint16_t station_;
+  std::string name_;
+  bool owns_eeprom_ = false, acknowledged_ = false;
 
   MailboxArea out_, in_;  // as the master sees it
   uint8_t mailbox_counter_ = 0;

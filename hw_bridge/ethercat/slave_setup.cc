@@ -21,11 +21,6 @@ int ManagerOf(const std::array<SyncManagerEntry, kNumSyncManagers>& managers, ui
   return customary;
 }
 
-template <class Config>
-std::optional<uint32_t> Given(bool has, const Config& value) {
-  return has ? std::optional<uint32_t>(value) : std::nullopt;
-}
-
 }  // namespace
 
 std::vector<uint8_t> BytesOf(const SdoValue& value) {
@@ -38,99 +33,83 @@ std::vector<uint8_t> BytesOf(const SdoValue& value) {
   const int64_t least = is_signed ? -range / 2 : 0, most = is_signed ? range / 2 - 1 : range - 1;
   if (!value.has_value() || value.value() < least || value.value() > most) {
     throw EthercatError(
-        fmt::format("EtherCAT configuration: sdo {:04X}:{:02X}: value must be "
-                    "between {} and {} for its type",
-                    value.index(), value.subindex(), least, most));
+        "EtherCAT configuration: sdo {:04X}:{:02X}: value must be between {} and {} for its type",
+        value.index(), value.subindex(), least, most);
   }
   std::vector<uint8_t> bytes(size);
   PutSized(bytes, 0, static_cast<uint64_t>(value.value()), size);
   return bytes;
 }
 
-std::string SlaveSetup::NameOf(size_t slave) const {
-  return is_drive(slave) ? config_->drive(static_cast<int>(slave)).joint()
-                         : config_->other(static_cast<int>(slave - num_drives())).name();
-}
-
-const DriveProfile& SlaveSetup::ProfileOf(size_t slave) const {
-  if (!is_drive(slave)) return config_->other(static_cast<int>(slave - num_drives())).profile();
-  const DriveConfig& drive = config_->drive(static_cast<int>(slave));
-  return drive.has_profile() ? drive.profile() : config_->profile();
-}
-
-std::optional<uint32_t> SlaveSetup::SerialOf(size_t slave) const {
-  if (is_drive(slave)) {
-    const DriveConfig& drive = config_->drive(static_cast<int>(slave));
-    return Given(drive.has_serial(), drive.serial());
+SlaveSetup::SlaveSetup(const MasterConfig* config, const ProcessImage* image)
+    : config_(config), image_(image) {
+  const auto given = [](bool has, uint32_t value) {
+    return has ? std::optional(value) : std::nullopt;
+  };
+  const auto add = [&](const std::string& name, const DriveProfile& profile, const auto& slave) {
+    slaves_.push_back({.name = name,
+                       .profile = &profile,
+                       .serial = given(slave.has_serial(), slave.serial()),
+                       .identification = given(slave.has_identification(), slave.identification()),
+                       .alias = given(slave.has_alias(), slave.alias()),
+                       .sdo = {&profile.sdo(), &slave.sdo()}});
+  };
+  for (const DriveConfig& drive : config->drive()) {
+    add(drive.joint(), drive.has_profile() ? drive.profile() : config->profile(), drive);
+    ConfiguredSlave& slave = slaves_.back();
+    slave.drive = &drive;
+    slave.sdo.insert(slave.sdo.begin() + 1, &config->sdo());
   }
-  const OtherSlave& other = config_->other(static_cast<int>(slave - num_drives()));
-  return Given(other.has_serial(), other.serial());
-}
-
-std::optional<uint32_t> SlaveSetup::IdentificationOf(size_t slave) const {
-  if (is_drive(slave)) {
-    const DriveConfig& drive = config_->drive(static_cast<int>(slave));
-    return Given(drive.has_identification(), drive.identification());
-  }
-  const OtherSlave& other = config_->other(static_cast<int>(slave - num_drives()));
-  return Given(other.has_identification(), other.identification());
-}
-
-std::optional<uint32_t> SlaveSetup::AliasOf(size_t slave) const {
-  if (is_drive(slave)) {
-    const DriveConfig& drive = config_->drive(static_cast<int>(slave));
-    return Given(drive.has_alias(), drive.alias());
-  }
-  const OtherSlave& other = config_->other(static_cast<int>(slave - num_drives()));
-  return Given(other.has_alias(), other.alias());
+  for (const OtherSlave& other : config->other()) add(other.name(), other.profile(), other);
 }
 
 Identity SlaveSetup::Check(size_t slave, SlaveAccess* access) const {
-  const DriveProfile& profile = ProfileOf(slave);
+  const DriveProfile& profile = *slaves_[slave].profile;
   const Identity identity = access->ReadIdentity();
   const auto compare = [&](std::string_view what, uint32_t found, uint32_t wanted) {
     if (found == wanted) return;
-    throw EthercatError(fmt::format(
-        "{}: its {} is 0x{:08X}, that of \"{}\" 0x{:08X}; is this the right drive at this place?",
-        access->Describe(), what, found, profile.name(), wanted));
+    access->Fail(
+        "its {} is 0x{:08X}, that of \"{}\" 0x{:08X}; is this the right drive at this place?", what,
+        found, profile.name(), wanted);
   };
   compare("vendor", identity.vendor, profile.vendor_id());
   compare("product code", identity.product, profile.product_code());
   if (profile.has_revision()) compare("revision", identity.revision, profile.revision());
-  if (const auto serial = SerialOf(slave)) compare("serial number", identity.serial, *serial);
+  if (const auto& serial = slaves_[slave].serial)
+    compare("serial number", identity.serial, *serial);
   return identity;
 }
 
 void SlaveSetup::Configure(size_t slave, SlaveAccess* access) const {
   const bool mailbox = access->SetUpMailbox();
-  if (!mailbox && is_drive(slave)) {
-    throw EthercatError(fmt::format(
-        "{}: its EEPROM offers no CoE mailbox; a drive of CiA 402 has one", access->Describe()));
+  const DriveConfig* const drive = slaves_[slave].drive;
+  if (!mailbox && drive != nullptr) {
+    access->Fail("its EEPROM offers no CoE mailbox; a drive of CiA 402 has one");
   }
   const auto managers = access->ReadSyncManagers();
   access->ReleaseEeprom();
   access->ChangeState(AlState::kPreOp);
   if (mailbox) {
-    if (is_drive(slave)) CheckRatings(slave, access);
+    if (drive != nullptr) CheckRatings(slave, access);
     WriteValues(slave, access);
     image_->Configure(slave, ManagerOf(managers, kTypeOutputs, kProcessOut),
                       ManagerOf(managers, kTypeInputs, kProcessIn), access);
-    if (is_drive(slave)) SetTorqueMode(slave, access);
+    if (drive != nullptr) SetTorqueMode(slave, access);
   }
   SetUpProcessData(slave, managers, access);
 }
 
 void SlaveSetup::CheckRatings(size_t slave, SlaveAccess* access) const {
-  const DriveProfile& profile = ProfileOf(slave);
-  const DriveConfig& expected = config_->drive(static_cast<int>(slave));
+  const DriveProfile& profile = *slaves_[slave].profile;
+  const DriveConfig& expected = *slaves_[slave].drive;
   const auto rated = [&](std::string_view field, ObjectAddress object, uint32_t wanted,
                          double unit_size, std::string_view unit) {
     const double found = access->Upload(object) * unit_size;
     if (std::llround(found) == wanted) return;
-    throw EthercatError(fmt::format(
-        "{}: object {:04X} ({}) is {} {}, the configuration says {} {}; every torque would be "
-        "wrong by that ratio: set up the drive or the configuration",
-        access->Describe(), object.index, field, found, unit, wanted, unit));
+    access->Fail(
+        "object {:04X} ({}) is {} {}, the configuration says {} {}; every torque would be wrong by "
+        "that ratio: set up the drive or the configuration",
+        object.index, field, found, unit, wanted, unit);
   };
   rated("rated_torque", {object::kRatedTorque, 0}, expected.rated_torque(),
         profile.rated_torque_unit(), "mN·m");
@@ -140,32 +119,24 @@ void SlaveSetup::CheckRatings(size_t slave, SlaveAccess* access) const {
         expected.rated_current(), 1, "mA");
   const uint32_t modes = access->Upload({object::kSupportedModes, 0});
   if ((modes >> (kModeCyclicTorque - 1) & 1) == 0) {
-    throw EthercatError(fmt::format(
-        "{}: object {:04X} (supported modes) is 0x{:08X}, without cyclic synchronous torque",
-        access->Describe(), object::kSupportedModes, modes));
+    access->Fail("object {:04X} (supported modes) is 0x{:08X}, without cyclic synchronous torque",
+                 object::kSupportedModes, modes);
   }
 }
 
 void SlaveSetup::WriteValues(size_t slave, SlaveAccess* access) const {
-  const auto write = [access](const auto& values) {
-    for (const SdoValue& value : values) {
+  for (const auto* values : slaves_[slave].sdo) {
+    for (const SdoValue& value : *values) {
       access->DownloadBytes(
           {static_cast<uint16_t>(value.index()), static_cast<uint8_t>(value.subindex())},
           BytesOf(value), value.complete_access());
     }
-  };
-  write(ProfileOf(slave).sdo());
-  if (!is_drive(slave)) {
-    write(config_->other(static_cast<int>(slave - num_drives())).sdo());
-    return;
   }
-  write(config_->sdo());
-  write(config_->drive(static_cast<int>(slave)).sdo());
 }
 
 void SlaveSetup::SetTorqueMode(size_t slave, SlaveAccess* access) const {
   // What the process data lack is set once, here.
-  const DriveConfig& drive = config_->drive(static_cast<int>(slave));
+  const DriveConfig& drive = *slaves_[slave].drive;
   if (!image_->Sends(slave, object::kMaxTorque) && drive.has_max_torque()) {
     try {
       access->Download({object::kMaxTorque, 0}, drive.max_torque(), 2);
@@ -190,10 +161,10 @@ void SlaveSetup::SetTorqueMode(size_t slave, SlaveAccess* access) const {
     if (mode == static_cast<uint32_t>(kModeCyclicTorque)) return;
     access->Pause();
   }
-  throw EthercatError(
-      fmt::format("{}: object {:04X} (mode) stays {} after cyclic synchronous torque (10) was "
-                  "asked for, and its process data do not report it",
-                  access->Describe(), object::kModeDisplay, mode));
+  access->Fail(
+      "object {:04X} (mode) stays {} after cyclic synchronous torque (10) was asked for, and its "
+      "process data do not report it",
+      object::kModeDisplay, mode);
 }
 
 void SlaveSetup::SetUpProcessData(size_t slave,
@@ -206,15 +177,9 @@ void SlaveSetup::SetUpProcessData(size_t slave,
     const int manager = ManagerOf(managers, type, customary);
     const uint16_t start = managers[static_cast<size_t>(manager)].start;
     if (start < reg::kRam) {
-      throw EthercatError(fmt::format("{}: its EEPROM gives no address for sync manager {}",
-                                      access->Describe(), manager));
+      access->Fail("its EEPROM gives no address for sync manager {}", manager);
     }
-    std::array<uint8_t, kSyncManagerSize> sync{};
-    Put<uint16_t>(sync, 0, start);
-    Put<uint16_t>(sync, 2, static_cast<uint16_t>(size));
-    sync[4] = control;
-    sync[6] = kSmEnable;
-    access->Write(static_cast<uint16_t>(reg::kSyncManager + manager * kSyncManagerSize), sync);
+    access->SetSyncManager(manager, start, static_cast<uint16_t>(size), control);
     std::array<uint8_t, kFmmuSize> map{};
     Put<uint32_t>(map, 0, kLogicalStart + static_cast<uint32_t>(image_offset));
     Put<uint16_t>(map, 4, static_cast<uint16_t>(size));

@@ -1,7 +1,9 @@
 // SlaveSetup: leads one slave from INIT to where it takes process data, as it is configured.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "hw_bridge/ethercat/ethercat.pb.h"
 #include "hw_bridge/ethercat/process_image.h"
@@ -12,22 +14,24 @@ namespace poise::ethercat {
 /// Logical address of the process image's first byte.
 inline constexpr uint32_t kLogicalStart = 0x00010000;
 
+/// What the configuration says of a slave, be it a drive or another.
+struct ConfiguredSlave {
+  std::string name;
+  const DriveProfile* profile;
+  const DriveConfig* drive = nullptr;                                    ///< nullptr: it is none
+  std::optional<uint32_t> serial = {}, identification = {}, alias = {};  ///< nullopt: any will do
+  /// Values that it is told at start-up, in this order.
+  std::vector<const google::protobuf::RepeatedPtrField<SdoValue>*> sdo = {};
+};
+
 /// Slaves are counted as in the process image: the drives, then the others. Every function throws
 /// EthercatError with the slave, the object or register, and what to do.
 class SlaveSetup {
  public:
   /// Both must outlive this.
-  SlaveSetup(const MasterConfig* config, const ProcessImage* image)
-      : config_(config), image_(image) {}
+  SlaveSetup(const MasterConfig* config, const ProcessImage* image);
 
-  size_t num_drives() const { return static_cast<size_t>(config_->drive_size()); }
-  bool is_drive(size_t slave) const { return slave < num_drives(); }
-  std::string NameOf(size_t slave) const;
-  const DriveProfile& ProfileOf(size_t slave) const;
-  /// What the configuration asks of a slave; nullopt: any will do.
-  std::optional<uint32_t> SerialOf(size_t slave) const;
-  std::optional<uint32_t> IdentificationOf(size_t slave) const;
-  std::optional<uint32_t> AliasOf(size_t slave) const;
+  const ConfiguredSlave& slave(size_t slave) const { return slaves_[slave]; }
 
   /// Reads the identity of a slave in INIT, which must be the configured one.
   Identity Check(size_t slave, SlaveAccess* access) const;
@@ -45,6 +49,7 @@ class SlaveSetup {
 
   const MasterConfig* config_;
   const ProcessImage* image_;
+  std::vector<ConfiguredSlave> slaves_;
 };
 
 /// The bytes of a configured value. Throws EthercatError: it does not fit its type.

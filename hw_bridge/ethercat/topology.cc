@@ -95,17 +95,16 @@ std::vector<SlavePlace> FindTopology(std::span<const SlavePorts> slaves,
     const int position = static_cast<int>(i);
     if (const int entry = EntryPort(slaves[i]); entry != 0) {
       const int before = BeforeOnCable(slaves, i, entry, open.empty() ? -1 : open.back().slave);
-      throw EthercatError(fmt::format(
+      throw EthercatError(
           "{}: frames enter it at port {} instead of port 0: its IN and OUT are swapped, and every "
           "slave behind it is out of its place; plug the cable that comes from the master into IN",
-          before >= 0 ? "the slave behind " + describe(before) : "the first slave", entry));
+          before >= 0 ? "the slave behind " + describe(before) : "the first slave", entry);
     }
     if (i > 0) {
       if (open.empty()) {
         throw EthercatError(
-            fmt::format("{}: no slave before it has an open port for it; are IN and OUT of a slave "
-                        "swapped?",
-                        describe(position)));
+            "{}: no slave before it has an open port for it; are IN and OUT of a slave swapped?",
+            describe(position));
       }
       places[i].parent = open.back().slave;
       places[i].parent_port = open.back().port;
@@ -118,9 +117,9 @@ std::vector<SlavePlace> FindTopology(std::span<const SlavePorts> slaves,
     places[i].delay = Delay(slaves, places, i);
   }
   if (!open.empty()) {
-    throw EthercatError(fmt::format(
+    throw EthercatError(
         "{}: its port {} is open, but no slave answers behind it; is something else plugged in?",
-        describe(open.back().slave), open.back().port));
+        describe(open.back().slave), open.back().port);
   }
   return places;
 }

@@ -18,7 +18,7 @@ void CheckName(const std::string& name, const char* what) {
     return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.' || c == ':' || c == '@';
   });
   if (!plain || name.size() > 100) {
-    throw UnitreeError(fmt::format("{} \"{}\": letters, digits and _-.:@ only", what, name));
+    throw UnitreeError("{} \"{}\": letters, digits and _-.:@ only", what, name);
   }
 }
 
@@ -55,8 +55,8 @@ class Participant::Domain {
     const std::lock_guard lock(mutex);
     if (std::shared_ptr<Domain> known = domains[id].lock()) {
       if (known->configuration_ != configuration) {
-        throw UnitreeError(
-            fmt::format("DDS domain {} is in use on another interface or tag by this process", id));
+        throw UnitreeError("DDS domain {} is in use on another interface or tag by this process",
+                           id);
       }
       return known;
     }
@@ -68,10 +68,10 @@ class Participant::Domain {
   Domain(const DdsLink& link, const std::string& configuration) : configuration_(configuration) {
     entity_ = dds_create_domain(link.domain(), configuration.c_str());
     if (entity_ < 0) {
-      throw UnitreeError(fmt::format(
-          "DDS domain {} on interface {} cannot be entered ({}); does `ip link` list it, "
-          "and is it up?",
-          link.domain(), link.interface(), dds_strretcode(entity_)));
+      throw UnitreeError(
+          "DDS domain {} on interface {} cannot be entered ({}); does `ip link` list it, and is it "
+          "up?",
+          link.domain(), link.interface(), dds_strretcode(entity_));
     }
   }
   ~Domain() { dds_delete(entity_); }
@@ -84,8 +84,8 @@ class Participant::Domain {
 Participant::Participant(const DdsLink& link) : domain_(Domain::Get(link)) {
   entity_ = dds_create_participant(link.domain(), nullptr, nullptr);
   if (entity_ < 0) {
-    throw UnitreeError(fmt::format("DDS domain {} on interface {} cannot be entered ({})",
-                                   link.domain(), link.interface(), dds_strretcode(entity_)));
+    throw UnitreeError("DDS domain {} on interface {} cannot be entered ({})", link.domain(),
+                       link.interface(), dds_strretcode(entity_));
   }
 }
 

@@ -1,9 +1,12 @@
 // The robots' messages, by short names, and what can go wrong with them.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <stdexcept>
+#include <utility>
 
 #include "hw_bridge/unitree/unitree_api.h"
 #include "hw_bridge/unitree/unitree_hg.h"
@@ -31,6 +34,10 @@ inline constexpr uint8_t kMotorEnabled = 1;  ///< of MotorCmd's and MotorState's
 class UnitreeError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
+  template <class Arg, class... Args>
+  explicit UnitreeError(fmt::format_string<Arg, Args...> text, Arg&& arg, Args&&... args)
+      : std::runtime_error(fmt::format(text, std::forward<Arg>(arg), std::forward<Args>(args)...)) {
+  }
 };
 
 }  // namespace poise::unitree

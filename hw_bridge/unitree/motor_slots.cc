@@ -79,7 +79,7 @@ std::vector<size_t> MotorSlots(std::span<const std::string> joints, UnitreeBusCo
   }
   for (const MotorSlot& change : changes) {
     if (!has(change.joint())) {
-      throw UnitreeError(fmt::format("slot: the robot has no joint \"{}\"", change.joint()));
+      throw UnitreeError("slot: the robot has no joint \"{}\"", change.joint());
     }
   }
   const std::map<std::string, size_t> slots = SlotsOf(layout);
@@ -94,14 +94,13 @@ std::vector<size_t> MotorSlots(std::span<const std::string> joints, UnitreeBusCo
     }
     if (!slot || *slot >= kNumSlots) {
       throw UnitreeError(
-          fmt::format("joint \"{}\" has no motor in layout {}; name its slot, 0 to {}, in `slot`",
-                      joint, UnitreeBusConfig::Layout_Name(layout), kNumSlots - 1));
+          "joint \"{}\" has no motor in layout {}; name its slot, 0 to {}, in `slot`", joint,
+          UnitreeBusConfig::Layout_Name(layout), kNumSlots - 1);
     }
     const auto other = std::find(result.begin(), result.end(), *slot);
     if (other != result.end()) {
-      throw UnitreeError(fmt::format("joints \"{}\" and \"{}\" are both in slot {}",
-                                     joints[static_cast<size_t>(other - result.begin())], joint,
-                                     *slot));
+      throw UnitreeError("joints \"{}\" and \"{}\" are both in slot {}",
+                         joints[static_cast<size_t>(other - result.begin())], joint, *slot);
     }
     result.push_back(*slot);
   }

@@ -31,8 +31,8 @@ uint16_t ButtonsOf(const std::vector<std::string>& names) {
   for (const std::string& name : names) {
     const auto* const place = std::find(kNames.begin(), kNames.end(), name);
     if (place == kNames.end()) {
-      throw UnitreeError(fmt::format("\"{}\" is no button of the remote; it has {}", name,
-                                     fmt::join(kNames, " ")));
+      throw UnitreeError("\"{}\" is no button of the remote; it has {}", name,
+                         fmt::join(kNames, " "));
     }
     bits |= 1U << static_cast<unsigned>(place - kNames.begin());
   }

@@ -54,10 +54,10 @@ UnitreeDriveBus::UnitreeDriveBus(RobotLinkOpener open_link, const UnitreeBusConf
   for (size_t j = 0; j < slots.size(); ++j) {
     const robot::MotorModel& motor = model.motors()[j];
     if (!(motor.torque_per_ampere() > 0) || motor.encoder_counts <= 0) {
-      throw UnitreeError(fmt::format(
-          "joint \"{}\": its motor needs a torque_constant and encoder_counts above 0 in "
-          "the robot's description",
-          model.joints()[j].name));
+      throw UnitreeError(
+          "joint \"{}\": its motor needs a torque_constant and encoder_counts above 0 in the "
+          "robot's description",
+          model.joints()[j].name);
     }
     motors_.push_back({slots[j], motor});
   }
@@ -101,14 +101,12 @@ void UnitreeDriveBus::Release(int64_t deadline) {
     if (mode->empty()) return;
     if (!config_.release()) {
       throw UnitreeError(
-          fmt::format("the maker's controller \"{}\" still moves the robot; let it hang and "
-                      "release it with the "
-                      "remote, or set release: true",
-                      *mode));
+          "the maker's controller \"{}\" still moves the robot; let it hang and release it with "
+          "the remote, or set release: true",
+          *mode);
     }
     if (!link_->Release(deadline)) {
-      throw UnitreeError(
-          fmt::format("the robot does not let go of the maker's controller \"{}\"", *mode));
+      throw UnitreeError("the robot does not let go of the maker's controller \"{}\"", *mode);
     }
   }
 }

@@ -119,27 +119,15 @@ std::vector<ScannedSlave> ScanChain(ethercat::Link* link) {
   std::array<uint8_t, ethercat::kNumSyncManagers * ethercat::kSyncManagerSize> zeros{};
   static_cast<void>(
       transactions.Execute(ethercat::Command::kBwr, 0, ethercat::reg::kSyncManager, zeros));
-  std::array<uint8_t, 4> latch{};
-  static_cast<void>(
-      transactions.Execute(ethercat::Command::kBwr, 0, ethercat::reg::kDcReceiveTime, latch));
+  ethercat::LatchClocks(&transactions);
   std::vector<ethercat::SlaveAccess> slaves;
   std::vector<ethercat::SlavePorts> ports;
   for (int i = 0; i < *count; ++i) {
-    const auto station = static_cast<uint16_t>(kFirstStation + i);
-    std::array<uint8_t, 2> bytes{};
-    ethercat::Put<uint16_t>(bytes, 0, station);
-    static_cast<void>(transactions.Execute(ethercat::Command::kApwr,
-                                           ethercat::AutoIncrementAddress(i),
-                                           ethercat::reg::kStationAddress, bytes));
-    ethercat::SlaveAccess& slave = slaves.emplace_back(&transactions, kTimeouts, i, station);
+    ethercat::SlaveAccess& slave =
+        slaves.emplace_back(&transactions, kTimeouts, i, static_cast<uint16_t>(kFirstStation + i));
+    static_cast<void>(slave.AssignStation());
     slave.AwaitInit();
-    ethercat::SlavePorts& own = ports.emplace_back();
-    own.dl_status = slave.Read<uint16_t>(ethercat::reg::kDlStatus);
-    own.has_times = ethercat::HasClock(&slave);
-    for (size_t port = 0; own.has_times && port < own.times.size(); ++port) {
-      own.times[port] =
-          slave.Read<uint32_t>(static_cast<uint16_t>(ethercat::reg::kDcReceiveTime + 4 * port));
-    }
+    ports.push_back(slave.ReadPorts());
   }
   const auto places = ethercat::FindTopology(
       ports, [&](int position) { return slaves[static_cast<size_t>(position)].Describe(); });

@@ -8,10 +8,7 @@
 namespace poise::ethercat {
 namespace {
 
-constexpr size_t kExpedited = 4;       // bytes at most
-constexpr size_t kMostObject = 4096;   // bytes of an object that the master may announce
-constexpr size_t kInitiateBytes = 16;  // headers and the first eight bytes of a normal transfer
-constexpr size_t kSegmentBytes = 9;    // headers and command of a segment
+constexpr size_t kMostObject = 4096;  // bytes of an object that the master may announce
 constexpr uint8_t kCodeVariable = 7, kCodeRecord = 9;
 
 }  // namespace
@@ -94,7 +91,7 @@ void CoeServer::BeginUpload(const Sdo& sdo) {
     answer.value = static_cast<uint32_t>(GetSized(data_, 0, data_.size()));
     return Answer(answer);
   }
-  done_ = std::min(data_.size(), mailbox_ - kInitiateBytes);
+  done_ = std::min(data_.size(), mailbox_ - kSdoMessage);
   answer.total = static_cast<uint32_t>(data_.size());
   answer.data = std::span(data_).first(done_);
   Answer(answer);
@@ -107,7 +104,7 @@ void CoeServer::BeginUpload(const Sdo& sdo) {
 void CoeServer::UploadSegment(const Sdo& sdo) {
   if (transfer_ != Transfer::kUpload) return Abort({}, SdoAbort::kUnknownCommand);
   if (sdo.toggle != toggle_) return Abort(object_, SdoAbort::kToggle);
-  const size_t part = std::min(data_.size() - done_, mailbox_ - kSegmentBytes);
+  const size_t part = std::min(data_.size() - done_, mailbox_ - kSegmentHeader);
   const bool last = done_ + part == data_.size();
   Answer({.command = SdoCommand::kUploadSegmentResponse,
           .toggle = toggle_,

@@ -32,10 +32,9 @@ EmulatedChain::EmulatedChain(const EmulatedChainConfig& config, std::span<MotorL
     const size_t port = swapped && drive.port() == 1 ? 0 : drive.port();
     if (parent >= i || port >= kNumPorts || behind_[parent][port] >= 0) {
       throw EthercatError(
-          fmt::format("emulated slave {}: it cannot hang at port {} of slave {}: that is none "
-                      "before it, or the "
-                      "port is taken",
-                      i, port, parent));
+          "emulated slave {}: it cannot hang at port {} of slave {}: that is none before it, or "
+          "the port is taken",
+          i, port, parent);
     }
     behind_[parent][port] = static_cast<int>(i);
   }

@@ -1,9 +1,12 @@
 // Link: carries EtherCAT frames between a master and its chain of slaves, and tells the time.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <cstdint>
 #include <span>
 #include <stdexcept>
+#include <utility>
 
 namespace poise::ethercat {
 
@@ -12,6 +15,10 @@ namespace poise::ethercat {
 class EthercatError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
+  template <class Arg, class... Args>
+  explicit EthercatError(fmt::format_string<Arg, Args...> text, Arg&& arg, Args&&... args)
+      : std::runtime_error(fmt::format(text, std::forward<Arg>(arg), std::forward<Args>(args)...)) {
+  }
 };
 
 inline constexpr int64_t kMillisecond = 1'000'000;  // ns

@@ -45,8 +45,7 @@ void PutIpUdp(std::span<uint8_t> packet, size_t payload, bool to_slaves) {
 
 PcapWriter::PcapWriter(const std::string& path, Carrier carrier)
     : path_(path), file_(path, std::ios::binary), carrier_(carrier) {
-  if (!file_)
-    throw EthercatError(fmt::format("cannot write the capture {}: {}", path, std::strerror(errno)));
+  if (!file_) throw EthercatError("cannot write the capture {}: {}", path, std::strerror(errno));
   std::array<uint8_t, 24> header{};
   Put<uint32_t>(header, 0, 0xA1B23C4D);  // nanosecond time stamps
   Put<uint16_t>(header, 4, 2);           // version 2.4
@@ -79,9 +78,7 @@ void PcapWriter::Write(std::span<const uint8_t> frame, int64_t time, bool to_sla
 
 void PcapWriter::Close() {
   file_.close();
-  if (!file_)
-    throw EthercatError(
-        fmt::format("cannot write the capture {}: {}", path_, std::strerror(errno)));
+  if (!file_) throw EthercatError("cannot write the capture {}: {}", path_, std::strerror(errno));
 }
 
 bool CaptureLink::Send(std::span<const uint8_t> frame) {

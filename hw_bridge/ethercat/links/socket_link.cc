@@ -28,9 +28,8 @@ sockaddr_in Address(const UdpLink::Endpoint& endpoint) {
   address.sin_family = AF_INET;
   address.sin_port = htons(endpoint.port);
   if (inet_pton(AF_INET, endpoint.address.c_str(), &address.sin_addr) != 1) {
-    throw EthercatError(
-        fmt::format("EtherCAT over UDP: \"{}\" is no IPv4 address; give four numbers with dots",
-                    endpoint.address));
+    throw EthercatError("EtherCAT over UDP: \"{}\" is no IPv4 address; give four numbers with dots",
+                        endpoint.address);
   }
   return address;
 }
@@ -76,10 +75,9 @@ UdpLink::UdpLink(const Endpoint& endpoint, bool listen) : listen_(listen) {
   if (result != 0) {
     const int error = errno;
     if (socket_ >= 0) close(socket_);
-    throw EthercatError(fmt::format("EtherCAT over UDP: cannot {} {}:{}: {}{}",
-                                    listen ? "listen at" : "reach", endpoint.address, endpoint.port,
-                                    std::strerror(error),
-                                    error == EADDRINUSE ? "; give another port" : ""));
+    throw EthercatError("EtherCAT over UDP: cannot {} {}:{}: {}{}", listen ? "listen at" : "reach",
+                        endpoint.address, endpoint.port, std::strerror(error),
+                        error == EADDRINUSE ? "; give another port" : "");
   }
   sockaddr_in local{};
   socklen_t size = sizeof(local);
@@ -116,7 +114,7 @@ RawLink::RawLink(const std::string& interface, Side side) : side_(side) {
   const auto fail = [&](std::string_view problem) {
     if (socket_ >= 0) close(socket_);
     socket_ = -1;
-    throw EthercatError(fmt::format("EtherCAT on interface \"{}\": {}", interface, problem));
+    throw EthercatError("EtherCAT on interface \"{}\": {}", interface, problem);
   };
   // Protocol 0 until bind(): a socket with one takes the frames of every interface meanwhile.
   socket_ = socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);

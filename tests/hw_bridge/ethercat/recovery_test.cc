@@ -139,8 +139,8 @@ TEST(EthercatRecovery, TellsWhatSlavesSayOfThemselves) {
   bench.chain->slave(2).esc().CountReceiveError(0);
   bench.Cycles(1);
   const Attendant& attendant = *bench.master->attendant();
-  const SlaveDiagnosis fault = attendant.diagnosis(1);
-  EXPECT_EQ(fault.al_status, kOp);
+  const SlaveDiagnosis& fault = attendant.diagnosis(1);
+  EXPECT_EQ(fault.al_status(), kOp);
   EXPECT_EQ(fault.error_code, kErrorOverCurrent);
   EXPECT_EQ(fault.emergency, kErrorOverCurrent);
   EXPECT_EQ(fault.emergencies, 1);
