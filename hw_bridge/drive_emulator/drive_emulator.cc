@@ -132,7 +132,7 @@ void DriveEmulator::Configure(const ComponentContext& context, Wiring* wiring) {
 }
 
 void DriveEmulator::Open() {
-  socket_ = ethercat::OpenSlavesLink(link_config_);
+  socket_ = ethercat::OpenLink(link_config_, ethercat::SocketLink::Side::kSlaves);
   clock_offset_ = -socket_->Now();
 }
 

@@ -22,9 +22,6 @@ namespace poise {
 /// answered whenever they come.
 class DriveEmulator final : public Component, private Device {
  public:
-  /// Opens the slaves' side of the configured link.
-  using LinkOpener = std::unique_ptr<ethercat::SocketLink> (*)(const ethercat::LinkConfig& config);
-
   DriveEmulator();
   ~DriveEmulator() override;
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #include "components/framework/say_error.h"
 #include "poise/message_traits.hpp"
@@ -98,11 +99,11 @@ MasterConfig CompleteMasterConfig(MasterConfig config, const robot::RobotModel& 
   return config;
 }
 
-EthercatDriveBus::EthercatDriveBus(Link* link, const EthercatBusConfig& config,
+EthercatDriveBus::EthercatDriveBus(LinkOpener open_link, const EthercatBusConfig& config,
                                    const robot::RobotModel& model)
-    : config_(Checked(config)),
-      master_(link, CompleteMasterConfig(config.master(), model)),
-      link_(link),
+    : open_link_(std::move(open_link)),
+      config_(Checked(config)),
+      master_(nullptr, CompleteMasterConfig(config.master(), model)),
       steering_(config.master().cycle()),
       judge_(config.most_bad_in_a_row(), config.most_bad_in_100()) {
   const MasterConfig complete = CompleteMasterConfig(config.master(), model);
@@ -180,6 +181,16 @@ void EthercatDriveBus::Diagnose(bus_status_t* status) const {
 }
 
 void EthercatDriveBus::Start() {
+  link_ = open_link_(config_.link());
+  if (config_.has_capture()) {
+    using Carrier = CaptureLink::Carrier;
+    auto capture = std::make_unique<CaptureLink>(
+        std::move(link_), config_.capture(),
+        config_.link().has_udp() ? Carrier::kUdp : Carrier::kEthernet);
+    capture_ = capture.get();
+    link_ = std::move(capture);
+  }
+  master_.set_link(link_.get());
   const int64_t deadline =
       link_->Now() + static_cast<int64_t>(config_.start_timeout() * static_cast<double>(kSecond));
   while (!master_.CountSlaves() && link_->Now() < deadline) {
@@ -192,9 +203,19 @@ void EthercatDriveBus::Start() {
 }
 
 std::string EthercatDriveBus::Stop() {
+  if (!link_) return {};
   released_ = sent_ = false;
-  if (master_.Stop()) return {};
-  return "not all slaves of the EtherCAT bus have reached INIT; their watchdogs take the torque";
+  std::string problem;
+  if (!master_.Stop()) {
+    problem =
+        "not all slaves of the EtherCAT bus have reached INIT; their watchdogs take the torque";
+  }
+  try {
+    if (capture_ != nullptr) capture_->Close();
+  } catch (const EthercatError& error) {
+    problem += (problem.empty() ? "" : "; ") + std::string(error.what());
+  }
+  return problem;
 }
 
 CycleResult EthercatDriveBus::ReceiveFrames() {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +13,7 @@
 #include "hw_bridge/drive/drive_bus.h"
 #include "hw_bridge/ethercat/cia402.h"
 #include "hw_bridge/ethercat/drive_scale.h"
+#include "hw_bridge/ethercat/links/pcap.h"
 #include "hw_bridge/ethercat/master.h"
 
 namespace poise::ethercat {
@@ -20,20 +23,24 @@ namespace poise::ethercat {
 /// from the robot's by more than 1 %. No drive at all: one for each joint, in the robot's order.
 MasterConfig CompleteMasterConfig(MasterConfig config, const robot::RobotModel& model);
 
+/// Opens the configured link. Throws EthercatError.
+using LinkOpener = std::function<std::unique_ptr<Link>(const LinkConfig& config)>;
+
 /// Target and greatest torque (6071, 6072) are zero until every drive that is to be enabled is, in
 /// cyclic synchronous torque; drives of faulted or disabled joints get none, and a quick stop when
 /// they are enabled. Receive gives counts, currents and states, of sensors what other slaves of the
 /// bus read, and nullptr in a cycle whose inputs are not whole. In it DRIVE_FAULT stands for a
 /// fault, STO, a mode that is not the one commanded, and a chain that is not in OP.
-class EthercatDriveBus : public DriveBus {
+class EthercatDriveBus final : public DriveBus {
  public:
-  /// `link` must outlive this. Throws EthercatError.
-  EthercatDriveBus(Link* link, const EthercatBusConfig& config, const robot::RobotModel& model);
+  /// Throws EthercatError.
+  EthercatDriveBus(LinkOpener open_link, const EthercatBusConfig& config,
+                   const robot::RobotModel& model);
 
-  /// Leads the chain to OP without torque; waits for one that is not there yet. Throws
-  /// EthercatError.
+  /// Opens the link and leads the chain to OP without torque; waits for one that is not there yet.
+  /// Throws EthercatError.
   void Start() override;
-  /// Leads the chain to INIT.
+  /// Leads the chain to INIT, and ends the capture.
   std::string Stop() override;
   void Idle(bool enable) override;
   void AwaitNextCycle() override;
@@ -79,9 +86,11 @@ class EthercatDriveBus : public DriveBus {
   void SendOutputs(const drive_command_t& command);
   int32_t Status(const Drive& drive, uint16_t statusword) const;
 
+  LinkOpener open_link_;
   EthercatBusConfig config_;
+  std::unique_ptr<Link> link_;      // from Start on
+  CaptureLink* capture_ = nullptr;  // the same, where frames are captured
   Master master_;
-  Link* link_;
   CycleSteering steering_;
   std::vector<Drive> drives_;  // by joint
   std::vector<Reading> readings_;

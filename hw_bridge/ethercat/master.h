@@ -38,6 +38,8 @@ class Master {
   /// `link` must outlive this. Throws EthercatError: a configuration that cannot work.
   Master(Link* link, const MasterConfig& config);
   ~Master();
+  /// In place of the link that it was made with, which may have been nullptr; before Start.
+  void set_link(Link* link) { transactions_.set_link(link); }
 
   size_t num_drives() const { return outputs_.size(); }
   /// The drives, then the others.

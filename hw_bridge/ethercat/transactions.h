@@ -40,6 +40,7 @@ class Transactions {
   /// The index for the next frame, for frames that are sent elsewhere on the same link.
   uint8_t NextIndex() { return ++index_; }
   Link* link() const { return link_; }
+  void set_link(Link* link) { link_ = link; }
   const FrameCounts& counts() const { return counts_; }
   FrameCounts* mutable_counts() { return &counts_; }
 

@@ -85,8 +85,9 @@ class Pair {
  public:
   Pair(const std::string& bridge_config, const std::string& emulator_config,
        const std::string& wiring) {
-    const uint16_t port =
-        ethercat::UdpLink::Listen({.address = "127.0.0.1", .port = 0})->local_port();
+    ethercat::UdpConfig any;
+    any.set_port(0);
+    const uint16_t port = ethercat::UdpLink(any, ethercat::SocketLink::Side::kSlaves).local_port();
     const std::string link = fmt::format("link {{ udp {{ port: {} }} }}", port);
     std::string drives = wiring;
     for (size_t at = 0; (at = drives.find("wiring", at)) != std::string::npos;) {

@@ -99,7 +99,8 @@ void ShowDrives(ethercat::RotorChain* drives, int64_t frames, double seconds) {
 
 int Emulate(const DrivesOptions& options) {
   CatchStopSignals();
-  const auto link = ethercat::OpenSlavesLink(ParseLink(options.link));
+  const auto link =
+      ethercat::OpenLink(ParseLink(options.link), ethercat::SocketLink::Side::kSlaves);
   ethercat::RotorChain drives(ChainOf(options), options.inertia, options.damping);
   fmt::print("{} drives of type {} on {}; Ctrl-C ends them\n", options.count, options.profile,
              options.link);
@@ -127,7 +128,8 @@ int Emulate(const DrivesOptions& options) {
 }
 
 int Scan(const DrivesOptions& options) {
-  const auto link = ethercat::OpenLink(ParseLink(options.link));
+  const auto link =
+      ethercat::OpenLink(ParseLink(options.link), ethercat::SocketLink::Side::kMaster);
   const std::string text = ConfigurationOf(ScanChain(link.get()));
   if (options.out.empty()) {
     fmt::print("{}", text);

@@ -15,21 +15,6 @@ constexpr size_t kLengthField = 6;  // of a datagram's header
 
 }  // namespace
 
-std::string_view Name(Command command) {
-  constexpr std::array<std::string_view, kNumCommands> kNames = {
-      "NOP", "APRD", "APWR", "APRW", "FPRD", "FPWR", "FPRW", "BRD",
-      "BWR", "BRW",  "LRD",  "LWR",  "LRW",  "ARMW", "FRMW"};
-  const auto index = static_cast<size_t>(command);
-  return index < kNames.size() ? kNames[index] : "unknown";
-}
-
-std::string_view Name(FrameError error) {
-  constexpr std::array<std::string_view, kNumFrameErrors> kNames = {
-      "none",   "too short", "too long", "not EtherCAT commands",
-      "length", "datagram",  "chain",    "unknown command"};
-  return kNames[static_cast<size_t>(error)];
-}
-
 void FrameBuilder::Clear() {
   size_ = kFrameHeader;
   last_ = 0;

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <string_view>
 
 namespace poise::ethercat {
 
@@ -37,9 +36,6 @@ enum class Command : uint8_t {
   kFrmw = 14,  ///< configured address physical read, multiple write
 };
 inline constexpr uint8_t kNumCommands = 15;
-
-/// "APRD", ...; "unknown" for a value of no command.
-std::string_view Name(Command command);
 
 /// Address field of auto-increment commands for the slave at `position` (0: first).
 constexpr uint16_t AutoIncrementAddress(int position) { return static_cast<uint16_t>(-position); }
@@ -98,7 +94,6 @@ enum class FrameError {
   kUnknownCommand,  ///< a command number of no command
 };
 inline constexpr int kNumFrameErrors = 8;
-std::string_view Name(FrameError error);
 
 /// Reads a frame of any bytes. Never allocates, never reads outside `bytes`.
 class FrameReader {

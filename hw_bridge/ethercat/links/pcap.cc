@@ -6,6 +6,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 #include "hw_bridge/ethercat/links/bytes.h"
@@ -43,9 +44,9 @@ void PutIpUdp(std::span<uint8_t> packet, size_t payload, bool to_slaves) {
 
 }  // namespace
 
-PcapWriter::PcapWriter(const std::string& path, Carrier carrier)
-    : path_(path), file_(path, std::ios::binary), carrier_(carrier) {
-  if (!file_) throw EthercatError("cannot write the capture {}: {}", path, std::strerror(errno));
+CaptureLink::CaptureLink(std::unique_ptr<Link> link, const std::string& path, Carrier carrier)
+    : link_(std::move(link)), path_(path), file_(path, std::ios::binary), carrier_(carrier) {
+  Check();
   std::array<uint8_t, 24> header{};
   Put<uint32_t>(header, 0, 0xA1B23C4D);  // nanosecond time stamps
   Put<uint16_t>(header, 4, 2);           // version 2.4
@@ -55,7 +56,8 @@ PcapWriter::PcapWriter(const std::string& path, Carrier carrier)
   file_.write(reinterpret_cast<const char*>(header.data()), header.size());
 }
 
-void PcapWriter::Write(std::span<const uint8_t> frame, int64_t time, bool to_slaves) {
+void CaptureLink::Write(std::span<const uint8_t> frame, bool to_slaves) {
+  const int64_t time = link_->Now();
   const bool udp = carrier_ == Carrier::kUdp;
   const size_t headers = kEthernetHeader + (udp ? kIpHeader + kUdpHeader : 0);
   std::vector<uint8_t> packet(std::max(headers + frame.size(), kMinEthernet), 0);
@@ -76,19 +78,23 @@ void PcapWriter::Write(std::span<const uint8_t> frame, int64_t time, bool to_sla
               static_cast<std::streamsize>(packet.size()));
 }
 
-void PcapWriter::Close() {
+void CaptureLink::Close() {
   file_.close();
+  Check();
+}
+
+void CaptureLink::Check() const {
   if (!file_) throw EthercatError("cannot write the capture {}: {}", path_, std::strerror(errno));
 }
 
 bool CaptureLink::Send(std::span<const uint8_t> frame) {
-  writer_->Write(frame, link_->Now(), true);
+  Write(frame, true);
   return link_->Send(frame);
 }
 
 size_t CaptureLink::Receive(std::span<uint8_t> frame, int64_t deadline) {
   const size_t size = link_->Receive(frame, deadline);
-  if (size > 0) writer_->Write(frame.first(size), link_->Now(), false);
+  if (size > 0) Write(frame.first(size), false);
   return size;
 }
 

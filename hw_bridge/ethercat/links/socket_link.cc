@@ -23,19 +23,15 @@ namespace {
 
 constexpr uint8_t kLocallyAdministered = 0x02;
 
-sockaddr_in Address(const UdpLink::Endpoint& endpoint) {
+sockaddr_in Address(const UdpConfig& config) {
   sockaddr_in address{};
   address.sin_family = AF_INET;
-  address.sin_port = htons(endpoint.port);
-  if (inet_pton(AF_INET, endpoint.address.c_str(), &address.sin_addr) != 1) {
+  address.sin_port = htons(static_cast<uint16_t>(config.port()));
+  if (inet_pton(AF_INET, config.address().c_str(), &address.sin_addr) != 1) {
     throw EthercatError("EtherCAT over UDP: \"{}\" is no IPv4 address; give four numbers with dots",
-                        endpoint.address);
+                        config.address());
   }
   return address;
-}
-
-UdpLink::Endpoint EndpointOf(const UdpConfig& config) {
-  return {.address = config.address(), .port = static_cast<uint16_t>(config.port())};
 }
 
 }  // namespace
@@ -57,26 +53,18 @@ bool SocketLink::WaitReadable(int64_t deadline) const {
   }
 }
 
-std::unique_ptr<UdpLink> UdpLink::Connect(const Endpoint& peer) {
-  return std::unique_ptr<UdpLink>(new UdpLink(peer, false));
-}
-
-std::unique_ptr<UdpLink> UdpLink::Listen(const Endpoint& local) {
-  return std::unique_ptr<UdpLink>(new UdpLink(local, true));
-}
-
-UdpLink::UdpLink(const Endpoint& endpoint, bool listen) : listen_(listen) {
-  const sockaddr_in address = Address(endpoint);
+UdpLink::UdpLink(const UdpConfig& config, Side side) : listen_(side == Side::kSlaves) {
+  const sockaddr_in address = Address(config);
   socket_ = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   const auto* raw = reinterpret_cast<const sockaddr*>(&address);
   const int result = socket_ < 0 ? -1
-                     : listen    ? bind(socket_, raw, sizeof(address))
+                     : listen_   ? bind(socket_, raw, sizeof(address))
                                  : connect(socket_, raw, sizeof(address));
   if (result != 0) {
     const int error = errno;
     if (socket_ >= 0) close(socket_);
-    throw EthercatError("EtherCAT over UDP: cannot {} {}:{}: {}{}", listen ? "listen at" : "reach",
-                        endpoint.address, endpoint.port, std::strerror(error),
+    throw EthercatError("EtherCAT over UDP: cannot {} {}:{}: {}{}", listen_ ? "listen at" : "reach",
+                        config.address(), config.port(), std::strerror(error),
                         error == EADDRINUSE ? "; give another port" : "");
   }
   sockaddr_in local{};
@@ -193,16 +181,10 @@ void CheckLink(const LinkConfig& config) {
   }
 }
 
-std::unique_ptr<Link> OpenLink(const LinkConfig& config) {
+std::unique_ptr<SocketLink> OpenLink(const LinkConfig& config, SocketLink::Side side) {
   CheckLink(config);
-  if (config.has_udp()) return UdpLink::Connect(EndpointOf(config.udp()));
-  return std::make_unique<RawLink>(config.interface(), RawLink::Side::kMaster);
-}
-
-std::unique_ptr<SocketLink> OpenSlavesLink(const LinkConfig& config) {
-  CheckLink(config);
-  if (config.has_udp()) return UdpLink::Listen(EndpointOf(config.udp()));
-  return std::make_unique<RawLink>(config.interface(), RawLink::Side::kSlaves);
+  if (config.has_udp()) return std::make_unique<UdpLink>(config.udp(), side);
+  return std::make_unique<RawLink>(config.interface(), side);
 }
 
 }  // namespace poise::ethercat

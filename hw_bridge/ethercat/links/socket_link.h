@@ -16,6 +16,8 @@ namespace poise::ethercat {
 /// Common to both: an owned socket and the monotonic clock.
 class SocketLink : public Link {
  public:
+  enum class Side { kMaster, kSlaves };
+
   ~SocketLink() override;
   int64_t Now() const override;
   /// Readable when a frame has come.
@@ -33,22 +35,15 @@ class SocketLink : public Link {
 /// EtherCAT over UDP (ETG.1000.4, 5.2.3), IPv4. Needs no privileges.
 class UdpLink final : public SocketLink {
  public:
-  struct Endpoint {
-    std::string address;  ///< numeric IPv4
-    uint16_t port = 0;
-  };
-  /// Master's side: sends to `peer`, takes frames from it alone. Throws EthercatError.
-  static std::unique_ptr<UdpLink> Connect(const Endpoint& peer);
-  /// Slaves' side: answers whoever sent last. Port 0: any free one. Throws EthercatError.
-  static std::unique_ptr<UdpLink> Listen(const Endpoint& local);
+  /// A master sends to the address and takes frames from it alone; slaves listen there (port 0: any
+  /// free one) and answer whoever sent last. Throws EthercatError.
+  UdpLink(const UdpConfig& config, Side side);
 
   uint16_t local_port() const { return local_port_; }
   bool Send(std::span<const uint8_t> frame) override;
   size_t Receive(std::span<uint8_t> frame, int64_t deadline) override;
 
  private:
-  explicit UdpLink(const Endpoint& endpoint, bool listen);
-
   sockaddr_in peer_{};
   bool peer_known_ = false;
   bool listen_;
@@ -61,7 +56,6 @@ class RawLink final : public SocketLink {
   /// A slave's side gives frames back with the addresses they came with, the locally administered
   /// bit of the source set, as an ESC does to the frames that pass it (whether it was set before or
   /// not); a master's side takes only those with its own source, with or without the bit.
-  enum class Side { kMaster, kSlaves };
   /// Throws EthercatError: no such interface, interface down, no privilege.
   RawLink(const std::string& interface, Side side);
 
@@ -80,10 +74,8 @@ class RawLink final : public SocketLink {
 /// Throws ConfigError "link...": not exactly one kind is set, or a number breaks its rule.
 void CheckLink(const LinkConfig& config);
 
-/// The master's side of the configured link. Throws ConfigError as CheckLink, and EthercatError: it
-/// cannot be opened.
-std::unique_ptr<Link> OpenLink(const LinkConfig& config);
-/// The slaves' side, likewise.
-std::unique_ptr<SocketLink> OpenSlavesLink(const LinkConfig& config);
+/// One side of the configured link. Throws ConfigError as CheckLink, and EthercatError: it cannot
+/// be opened.
+std::unique_ptr<SocketLink> OpenLink(const LinkConfig& config, SocketLink::Side side);
 
 }  // namespace poise::ethercat

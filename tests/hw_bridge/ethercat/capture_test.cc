@@ -65,13 +65,13 @@ std::vector<Dissection> Dissect(const std::filesystem::path& path) {
   return frames;
 }
 
-class Capture : public ::testing::TestWithParam<PcapWriter::Carrier> {
+class Capture : public ::testing::TestWithParam<CaptureLink::Carrier> {
  protected:
   static void SetUpTestSuite() {
     has_tshark_ = std::system("tshark --version >/dev/null 2>&1") == 0;
   }
   Capture() {
-    const bool udp = GetParam() == PcapWriter::Carrier::kUdp;
+    const bool udp = GetParam() == CaptureLink::Carrier::kUdp;
     directory_ = fs::temp_directory_path() /
                  ("poise_capture_" + std::to_string(getpid()) + (udp ? "_udp" : "_ethernet"));
     fs::create_directories(directory_);
@@ -89,8 +89,7 @@ TEST_P(Capture, TsharkDecodesStartUpAndCyclesWithoutAComplaint) {
   Bench bench(12);
   bench.master_config.set_drift_frames(20);
   bench.Build();
-  PcapWriter writer(path_.string(), GetParam());
-  CaptureLink capture(bench.faulty.get(), &writer);
+  CaptureLink capture(std::move(bench.faulty), path_.string(), GetParam());
   bench.master = std::make_unique<Master>(&capture, bench.master_config);
   bench.master->Start();
   bench.SetTorque(321, 1000);
@@ -99,7 +98,7 @@ TEST_P(Capture, TsharkDecodesStartUpAndCyclesWithoutAComplaint) {
   ASSERT_TRUE(bench.master->Stop());
   // What a slave refuses is a frame like any other.
   static_cast<void>(ErrorOf([&] { bench.master->slave(0).ChangeState(AlState::kOp); }));
-  writer.Close();
+  capture.Close();
 
   const std::vector<Dissection> frames = Dissect(path_);
   const FrameCounts& counts = bench.master->counts();
@@ -127,12 +126,14 @@ TEST_P(Capture, TsharkDecodesStartUpAndCyclesWithoutAComplaint) {
 // The check above can fail.
 TEST_P(Capture, TsharkComplainsOfAFrameThatIsCutShort) {
   if (!has_tshark_) GTEST_SKIP() << "tshark is not installed; deploy/setup installs it";
-  PcapWriter writer(path_.string(), GetParam());
+  Bench bench(1);
+  bench.Build();
+  CaptureLink capture(std::move(bench.link), path_.string(), GetParam());
   FrameBuilder builder;
   builder.AddZero(Command::kLrw, 1, 0, 1, 300);
-  writer.Write(builder.bytes(), 0, true);
-  writer.Write(builder.bytes().first(100), 1000, true);
-  writer.Close();
+  ASSERT_TRUE(capture.Send(builder.bytes()));
+  ASSERT_TRUE(capture.Send(builder.bytes().first(100)));
+  capture.Close();
   const std::vector<Dissection> frames = Dissect(path_);
   ASSERT_EQ(frames.size(), 2U);
   EXPECT_FALSE(frames[0].complaint);
@@ -140,15 +141,15 @@ TEST_P(Capture, TsharkComplainsOfAFrameThatIsCutShort) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Links, Capture,
-                         ::testing::Values(PcapWriter::Carrier::kEthernet,
-                                           PcapWriter::Carrier::kUdp),
+                         ::testing::Values(CaptureLink::Carrier::kEthernet,
+                                           CaptureLink::Carrier::kUdp),
                          [](const auto& carrier) {
-                           return carrier.param == PcapWriter::Carrier::kUdp ? "Udp" : "Ethernet";
+                           return carrier.param == CaptureLink::Carrier::kUdp ? "Udp" : "Ethernet";
                          });
 
-TEST(PcapWriter, NamesAFileThatCannotBe) {
+TEST(CaptureLink, NamesAFileThatCannotBe) {
   EXPECT_THAT(ErrorOf([] {
-                PcapWriter("/nonexistent/folder/frames.pcap", PcapWriter::Carrier::kEthernet);
+                CaptureLink(nullptr, "/nonexistent/folder/frames.pcap", CaptureLink::Carrier::kUdp);
               }),
               ::testing::HasSubstr("/nonexistent/folder/frames.pcap"));
 }

@@ -74,9 +74,13 @@ class EthercatBus : public ::testing::Test {
     MasterConfig partial = bench_.master_config;
     bench_.master_config = CompleteMasterConfig(partial, Model());
     bench_.Build();
-    spy_ = std::make_unique<SpyLink>(bench_.faulty.get());
     *config_.mutable_master() = partial;
-    bus_ = std::make_unique<EthercatDriveBus>(spy_.get(), config_, Model());
+    const auto open = [this](const LinkConfig&) {
+      auto spy = std::make_unique<SpyLink>(bench_.faulty.get());
+      spy_ = spy.get();
+      return spy;
+    };
+    bus_ = std::make_unique<EthercatDriveBus>(open, config_, Model());
   }
   void Start() {
     Build();
@@ -100,7 +104,7 @@ class EthercatBus : public ::testing::Test {
 
   Bench bench_;
   EthercatBusConfig config_;
-  std::unique_ptr<SpyLink> spy_;
+  SpyLink* spy_ = nullptr;  // from the start on
   std::unique_ptr<EthercatDriveBus> bus_;
   drive_command_t command_;
 };

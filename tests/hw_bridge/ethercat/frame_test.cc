@@ -171,8 +171,6 @@ TEST(EthercatNames, AreTheStandards) {
   EXPECT_THAT(std::string(SdoAbortText(0x08000022)), HasSubstr("device state"));
   EXPECT_EQ(SdoAbortText(1), "unknown SDO abort code");
   EXPECT_EQ(Name(AlState::kSafeOp), "SAFE-OP");
-  EXPECT_EQ(Name(Command::kFrmw), "FRMW");
-  EXPECT_EQ(Name(static_cast<Command>(200)), "unknown");
 }
 
 }  // namespace

@@ -96,16 +96,29 @@ void RunDrives(Link* master_link, Link* slaves_link) {
   for (size_t i = 0; i < 12; ++i) EXPECT_EQ(chain.slave(i).al_state(), AlState::kInit);
 }
 
+UdpConfig Udp(uint32_t port, const std::string& address) {
+  UdpConfig config;
+  config.set_port(port);
+  config.set_address(address);
+  return config;
+}
+std::unique_ptr<UdpLink> Listen(uint32_t port) {
+  return std::make_unique<UdpLink>(Udp(port, "127.0.0.1"), SocketLink::Side::kSlaves);
+}
+std::unique_ptr<UdpLink> Connect(uint32_t port, const std::string& address = "127.0.0.1") {
+  return std::make_unique<UdpLink>(Udp(port, address), SocketLink::Side::kMaster);
+}
+
 TEST(UdpLink, CarriesTwelveDrives) {
-  const auto slaves = UdpLink::Listen({.address = "127.0.0.1", .port = 0});
-  const auto master = UdpLink::Connect({.address = "127.0.0.1", .port = slaves->local_port()});
+  const auto slaves = Listen(0);
+  const auto master = Connect(slaves->local_port());
   RunDrives(master.get(), slaves.get());
 }
 
 TEST(UdpLink, TakesFramesOfItsPeerAlone) {
-  const auto slaves = UdpLink::Listen({.address = "127.0.0.1", .port = 0});
-  const auto master = UdpLink::Connect({.address = "127.0.0.1", .port = slaves->local_port()});
-  const auto stranger = UdpLink::Connect({.address = "127.0.0.1", .port = master->local_port()});
+  const auto slaves = Listen(0);
+  const auto master = Connect(slaves->local_port());
+  const auto stranger = Connect(master->local_port());
   const uint8_t hello[] = {1, 2, 3};
   ASSERT_TRUE(stranger->Send(hello));
   std::array<uint8_t, 16> frame{};
@@ -120,37 +133,37 @@ TEST(UdpLink, TakesFramesOfItsPeerAlone) {
 TEST(UdpLink, SurvivesThatNobodyListens) {
   uint16_t port = 0;
   {
-    const auto gone = UdpLink::Listen({.address = "127.0.0.1", .port = 0});
+    const auto gone = Listen(0);
     port = gone->local_port();
   }
   MasterConfig config = MakeMasterConfig(1);
-  const auto link = UdpLink::Connect({.address = "127.0.0.1", .port = port});
+  const auto link = Connect(port);
   Master master(link.get(), config);
   EXPECT_THAT(ErrorOf([&] { master.Start(); }), HasSubstr("no frame comes back"));
 }
 
 TEST(UdpLink, NamesAddressesThatCannotBe) {
-  EXPECT_THAT(ErrorOf([] { UdpLink::Connect({.address = "robot", .port = 1}); }),
-              HasSubstr("\"robot\" is no IPv4 address"));
-  const auto taken = UdpLink::Listen({.address = "127.0.0.1", .port = 0});
-  EXPECT_THAT(
-      ErrorOf([&] { UdpLink::Listen({.address = "127.0.0.1", .port = taken->local_port()}); }),
-      HasSubstr("give another port"));
+  EXPECT_THAT(ErrorOf([] { Connect(1, "robot"); }), HasSubstr("\"robot\" is no IPv4 address"));
+  const auto taken = Listen(0);
+  EXPECT_THAT(ErrorOf([&] { Listen(taken->local_port()); }), HasSubstr("give another port"));
 }
 
 TEST(OpenLink, TakesExactlyOneKind) {
   LinkConfig config;
-  EXPECT_THAT(ErrorOf([&] { OpenLink(config); }), HasSubstr("either udp or interface"));
+  EXPECT_THAT(ErrorOf([&] { OpenLink(config, SocketLink::Side::kMaster); }),
+              HasSubstr("either udp or interface"));
   config.mutable_udp();
-  EXPECT_NE(OpenLink(config), nullptr);
+  EXPECT_NE(OpenLink(config, SocketLink::Side::kMaster), nullptr);
   config.mutable_udp()->set_port(70000);
-  EXPECT_THAT(ErrorOf([&] { OpenLink(config); }),
+  EXPECT_THAT(ErrorOf([&] { OpenLink(config, SocketLink::Side::kMaster); }),
               HasSubstr("link.udp.port: is 70000; must be 1 to 65535"));
   config.mutable_udp()->clear_port();
   config.set_interface("no_such_if");
-  EXPECT_THAT(ErrorOf([&] { OpenLink(config); }), HasSubstr("either udp or interface"));
+  EXPECT_THAT(ErrorOf([&] { OpenLink(config, SocketLink::Side::kMaster); }),
+              HasSubstr("either udp or interface"));
   config.clear_udp();
-  EXPECT_THAT(ErrorOf([&] { OpenLink(config); }), HasSubstr("no_such_if"));
+  EXPECT_THAT(ErrorOf([&] { OpenLink(config, SocketLink::Side::kMaster); }),
+              HasSubstr("no_such_if"));
 }
 
 TEST(RawLink, NamesInterfacesThatCannotBe) {
