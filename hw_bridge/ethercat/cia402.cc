@@ -1,54 +1,37 @@
 #include "hw_bridge/ethercat/cia402.h"
 
-#include <array>
-
 namespace poise::ethercat {
+namespace {
 
-std::string_view Name(DriveState state) {
-  constexpr std::array<std::string_view, kNumDriveStates> kNames = {"not ready to switch on",
-                                                                    "switch on disabled",
-                                                                    "ready to switch on",
-                                                                    "switched on",
-                                                                    "operation enabled",
-                                                                    "quick stop active",
-                                                                    "fault reaction active",
-                                                                    "fault",
-                                                                    "unknown"};
-  return kNames[static_cast<size_t>(state)];
-}
+/// By DriveState: the bits of a statusword that tell a state, and what they are in it.
+struct StateCode {
+  std::string_view name;
+  uint16_t mask, bits;
+};
+constexpr StateCode kStates[kNumDriveStates] = {
+    {"unknown", 0, 0},
+    {"not ready to switch on", 0x4F, 0x00},
+    {"switch on disabled", 0x4F, 0x40},
+    {"ready to switch on", 0x6F, 0x21},
+    {"switched on", 0x6F, 0x23},
+    {"operation enabled", 0x6F, 0x27},
+    {"quick stop active", 0x6F, 0x07},
+    {"fault reaction active", 0x4F, 0x0F},
+    {"fault", 0x4F, 0x08},
+};
+
+}  // namespace
+
+std::string_view Name(DriveState state) { return kStates[static_cast<size_t>(state)].name; }
 
 DriveState DecodeState(uint16_t statusword) {
-  switch (statusword & 0x4F) {
-    case 0x00:
-      return DriveState::kNotReadyToSwitchOn;
-    case 0x40:
-      return DriveState::kSwitchOnDisabled;
-    case 0x0F:
-      return DriveState::kFaultReactionActive;
-    case 0x08:
-      return DriveState::kFault;
-    default:
-      break;
+  for (int i = 1; i < kNumDriveStates; ++i) {
+    if ((statusword & kStates[i].mask) == kStates[i].bits) return static_cast<DriveState>(i);
   }
-  switch (statusword & 0x6F) {
-    case 0x21:
-      return DriveState::kReadyToSwitchOn;
-    case 0x23:
-      return DriveState::kSwitchedOn;
-    case 0x27:
-      return DriveState::kOperationEnabled;
-    case 0x07:
-      return DriveState::kQuickStopActive;
-    default:
-      return DriveState::kUnknown;
-  }
+  return DriveState::kUnknown;
 }
 
-uint16_t EncodeState(DriveState state) {
-  constexpr std::array<uint16_t, kNumDriveStates> kBits = {0x00, 0x40, 0x21, 0x23, 0x27,
-                                                           0x07, 0x0F, 0x08, 0x00};
-  return kBits[static_cast<size_t>(state)];
-}
+uint16_t EncodeState(DriveState state) { return kStates[static_cast<size_t>(state)].bits; }
 
 uint16_t DriveControl::Controlword(DriveState state, DriveGoal goal) {
   if (reset_ == Reset::kLow) {
@@ -74,9 +57,7 @@ uint16_t DriveControl::Controlword(DriveState state, DriveGoal goal) {
     case DriveState::kSwitchedOn:
     case DriveState::kOperationEnabled:
       return kControlEnable;
-    case DriveState::kQuickStopActive:
-      return kControlDisableVoltage;  // out of it, without torque; then enabled anew
-    default:
+    default:  // a quick stop included: out of it, without torque; then enabled anew
       return kControlDisableVoltage;
   }
 }

@@ -6,7 +6,9 @@
 
 namespace poise::ethercat {
 
+/// With the values of bridge_status_t's DRIVE_*.
 enum class DriveState : uint8_t {
+  kUnknown,  ///< a statusword of no state
   kNotReadyToSwitchOn,
   kSwitchOnDisabled,
   kReadyToSwitchOn,
@@ -15,7 +17,6 @@ enum class DriveState : uint8_t {
   kQuickStopActive,
   kFaultReactionActive,
   kFault,
-  kUnknown,  ///< a statusword of no state
 };
 inline constexpr int kNumDriveStates = 9;
 std::string_view Name(DriveState state);

@@ -21,29 +21,11 @@ const EthercatBusConfig& Checked(const EthercatBusConfig& config) {
   return config;
 }
 
-int8_t ReportOf(DriveState state) {
-  switch (state) {
-    case DriveState::kNotReadyToSwitchOn:
-      return bridge_status_t::DRIVE_NOT_READY;
-    case DriveState::kSwitchOnDisabled:
-      return bridge_status_t::DRIVE_SWITCH_ON_DISABLED;
-    case DriveState::kReadyToSwitchOn:
-      return bridge_status_t::DRIVE_READY;
-    case DriveState::kSwitchedOn:
-      return bridge_status_t::DRIVE_SWITCHED_ON;
-    case DriveState::kOperationEnabled:
-      return bridge_status_t::DRIVE_ENABLED;
-    case DriveState::kQuickStopActive:
-      return bridge_status_t::DRIVE_QUICK_STOP;
-    case DriveState::kFaultReactionActive:
-      return bridge_status_t::DRIVE_FAULT_REACTION;
-    case DriveState::kFault:
-      return bridge_status_t::DRIVE_FAULT;
-    case DriveState::kUnknown:
-      break;
-  }
-  return bridge_status_t::DRIVE_UNKNOWN;
-}
+static_assert(static_cast<int>(DriveState::kUnknown) == bridge_status_t::DRIVE_UNKNOWN &&
+              static_cast<int>(DriveState::kSwitchOnDisabled) ==
+                  bridge_status_t::DRIVE_SWITCH_ON_DISABLED &&
+              static_cast<int>(DriveState::kOperationEnabled) == bridge_status_t::DRIVE_ENABLED &&
+              static_cast<int>(DriveState::kFault) == bridge_status_t::DRIVE_FAULT);
 
 }  // namespace
 
@@ -258,7 +240,7 @@ void EthercatDriveBus::TakeInputs() {
     feedback_.position_counts[j] = drive.scale.JointCounts(drive.counter.Update(inputs.position));
     feedback_.current[j] = drive.scale.Current(inputs.torque);
     feedback_.drive_status[j] = Status(drive, inputs.statusword);
-    reports_[j] = {.state = ReportOf(drive.state),
+    reports_[j] = {.state = static_cast<int8_t>(drive.state),
                    .sto = drive.state != DriveState::kUnknown &&
                           (inputs.statusword & kStatusVoltageEnabled) == 0};
   }

@@ -80,7 +80,7 @@ class Master {
   int position(size_t slave) const { return positions_[slave]; }
   /// What a slave reports in an object, of the last complete read. `place`: from image().
   uint64_t input(const ProcessImage::Place& place) const {
-    return ProcessImage::Extract(place, image_bytes_);
+    return GetBits(image_bytes_, place.bit, place.bits);
   }
   /// What the drive said at the start that it is.
   const Identity& identity(size_t drive) const { return identities_[drive]; }

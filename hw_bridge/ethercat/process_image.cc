@@ -168,15 +168,6 @@ std::optional<ProcessImage::Place> ProcessImage::FindInput(size_t slave, uint16_
   return Place{.bit = 8 * inputs_at(slave) + entry->bit, .bits = entry->bits};
 }
 
-uint64_t ProcessImage::Extract(const Place& place, std::span<const uint8_t> image) {
-  uint64_t value = 0;
-  for (size_t i = 0; i < place.bits; ++i) {
-    const size_t bit = place.bit + i;
-    value |= uint64_t{static_cast<uint8_t>(image[bit / 8] >> (bit % 8) & 1)} << i;
-  }
-  return value;
-}
-
 void ProcessImage::Configure(size_t slave, int outputs, int inputs, SlaveAccess* access) const {
   const auto assign = [](int manager) { return static_cast<uint16_t>(object::kAssign + manager); };
   ConfigureDirection(slaves_[slave].rx, assign(outputs), slaves_[slave].fixed, access);

@@ -89,7 +89,6 @@ class ProcessImage {
     uint8_t bits = 0;
   };
   std::optional<Place> FindInput(size_t slave, uint16_t index, uint8_t subindex) const;
-  static uint64_t Extract(const Place& place, std::span<const uint8_t> image);
 
   /// Makes a slave in PRE-OP map these objects to the process data of sync managers `outputs` and
   /// `inputs`, by SDO, and reads back that it does.

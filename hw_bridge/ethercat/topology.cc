@@ -9,8 +9,6 @@
 namespace poise::ethercat {
 namespace {
 
-constexpr std::array<int, kNumPorts> kFrameOrder = {0, 3, 1, 2};
-
 std::vector<int> ActivePorts(const SlavePorts& slave) {
   std::vector<int> ports;
   for (const int port : kFrameOrder) {

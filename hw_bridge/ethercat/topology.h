@@ -12,6 +12,9 @@
 
 namespace poise::ethercat {
 
+/// In which a frame passes a slave's ports.
+inline constexpr std::array<int, kNumPorts> kFrameOrder = {0, 3, 1, 2};
+
 /// What a slave shows of its ports. Receive times: when one broadcast write passed each port, ns of
 /// the slave's own clock, modulo 2^32.
 struct SlavePorts {

@@ -7,7 +7,8 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_rules.h"
-#include "hw_bridge/ethercat/emulator/rotor_chain.h"
+#include "hw_bridge/ethercat/emulator/emulated_chain.h"
+#include "hw_bridge/ethercat/emulator/rotor.h"
 #include "hw_bridge/ethercat/links/socket_link.h"
 #include "tools/cli/cli_checks.h"
 #include "tools/cli/command_line.h"
@@ -78,19 +79,20 @@ ethercat::EmulatedChainConfig ChainOf(const DrivesOptions& options) {
   return chain;
 }
 
-void ShowDrives(ethercat::RotorChain* drives, int64_t frames, double seconds) {
+void ShowDrives(ethercat::EmulatedChain* chain, const std::vector<ethercat::Rotor>& rotors,
+                int64_t frames, double seconds) {
   std::string states;
   double torque = 0, speed = 0;
-  for (size_t i = 0; i < drives->chain().size(); ++i) {
-    const ethercat::EmulatedSlave& slave = drives->chain().slave(i);
+  for (size_t i = 0; i < rotors.size(); ++i) {
+    const ethercat::EmulatedSlave& slave = chain->slave(i);
     const std::string name(ethercat::Name(slave.al_state()));
     const std::string state =
         fmt::format("{}{} ({})", name, slave.al_error() ? " with an error" : "",
                     ethercat::Name(slave.drive().state()));
     if (i == 0) states = state;
     if (state != states) states = "differing states";
-    torque = std::max(torque, std::abs(drives->rotor(i).torque()));
-    speed = std::max(speed, std::abs(drives->rotor(i).velocity()));
+    torque = std::max(torque, std::abs(rotors[i].torque()));
+    speed = std::max(speed, std::abs(rotors[i].velocity()));
   }
   fmt::print("{:6.0f} s  {:6} frames/s  {}  torque at most {:.3f} N·m, speed {:.1f} rad/s\n",
              seconds, frames, states, torque, speed);
@@ -101,7 +103,11 @@ int Emulate(const DrivesOptions& options) {
   CatchStopSignals();
   const auto link =
       ethercat::OpenLink(ParseLink(options.link), ethercat::SocketLink::Side::kSlaves);
-  ethercat::RotorChain drives(ChainOf(options), options.inertia, options.damping);
+  std::vector<ethercat::Rotor> rotors(static_cast<size_t>(options.count),
+                                      {options.inertia, options.damping});
+  std::vector<ethercat::MotorLoad*> loads;
+  for (ethercat::Rotor& rotor : rotors) loads.push_back(&rotor);
+  ethercat::EmulatedChain chain(ChainOf(options), loads);
   fmt::print("{} drives of type {} on {}; Ctrl-C ends them\n", options.count, options.profile,
              options.link);
   std::fflush(stdout);
@@ -114,15 +120,12 @@ int Emulate(const DrivesOptions& options) {
     const size_t size = link->Receive(frame, link->Now() + ethercat::kMillisecond);
     const int64_t now = link->Now() - start;
     const std::span<uint8_t> bytes = std::span(frame).first(size);
-    if (size == 0) {
-      drives.AdvanceTo(now);
-    } else if (drives.HandleFrame(bytes, now)) {
-      static_cast<void>(link->Send(bytes));
-    }
+    chain.AdvanceTo(now);
+    if (size > 0 && chain.HandleFrame(bytes, now)) static_cast<void>(link->Send(bytes));
     if (link->Now() - shown < ethercat::kSecond) continue;
     shown = link->Now();
-    ShowDrives(&drives, drives.chain().frames() - frames, static_cast<double>(now) * 1e-9);
-    frames = drives.chain().frames();
+    ShowDrives(&chain, rotors, chain.frames() - frames, static_cast<double>(now) * 1e-9);
+    frames = chain.frames();
   }
   return kExitOk;
 }

@@ -6,12 +6,37 @@
 #include <array>
 
 #include "hw_bridge/ethercat/links/bytes.h"
+#include "hw_bridge/ethercat/topology.h"
 
 namespace poise::ethercat {
-
 namespace {
 
-constexpr std::array<int, kNumPorts> kFrameOrder = {0, 3, 1, 2};
+enum class Addressing : uint8_t { kNone, kPosition, kStation, kBroadcast, kLogical };
+
+/// What slaves do with a datagram.
+struct CommandKind {
+  Addressing addressing = Addressing::kNone;
+  bool reads = false, writes = false;
+  bool reads_one_writes_others = false;  ///< who is addressed puts in what the others take
+};
+/// By command.
+constexpr CommandKind kCommands[kNumCommands] = {
+    {},
+    {Addressing::kPosition, true, false},
+    {Addressing::kPosition, false, true},
+    {Addressing::kPosition, true, true},
+    {Addressing::kStation, true, false},
+    {Addressing::kStation, false, true},
+    {Addressing::kStation, true, true},
+    {Addressing::kBroadcast, true, false},
+    {Addressing::kBroadcast, false, true},
+    {Addressing::kBroadcast, true, true},
+    {Addressing::kLogical, true, false},
+    {Addressing::kLogical, false, true},
+    {Addressing::kLogical, true, true},
+    {Addressing::kPosition, true, true, true},
+    {Addressing::kStation, true, true, true},
+};
 
 }  // namespace
 
@@ -149,63 +174,29 @@ void EmulatedChain::Process(const Datagram& datagram, std::span<uint8_t> bytes,
   // The address as it is at this slave, changed by those before.
   const auto adp = Get<uint16_t>(bytes, 2);
 
-  bool read = false, write = false, merge = false;
-  switch (datagram.command) {
-    case Command::kNop:
-      return;
-    case Command::kAprd:
-    case Command::kApwr:
-    case Command::kAprw:
-      read = adp == 0 && datagram.command != Command::kApwr;
-      write = adp == 0 && datagram.command != Command::kAprd;
-      break;
-    case Command::kFprd:
-    case Command::kFpwr:
-    case Command::kFprw:
-      read = esc.HasAddress(adp) && datagram.command != Command::kFpwr;
-      write = esc.HasAddress(adp) && datagram.command != Command::kFprd;
-      break;
-    case Command::kBrd:
-    case Command::kBwr:
-    case Command::kBrw:
-      read = merge = datagram.command != Command::kBwr;
-      write = datagram.command != Command::kBrd;
-      break;
-    case Command::kArmw:
-      read = adp == 0;
-      write = !read;
-      break;
-    case Command::kFrmw:
-      read = esc.HasAddress(adp);
-      write = !read;
-      break;
-    case Command::kLrd:
-    case Command::kLwr:
-    case Command::kLrw: {
-      const bool reads = datagram.command != Command::kLwr;
-      const bool writes = datagram.command != Command::kLrd;
-      const EmulatedEsc::Access access =
-          esc.Logical(datagram.logical_address(), data, reads, writes, now);
-      const int both = reads && writes ? 2 : 1;
-      const auto counter = Get<uint16_t>(bytes, counter_at);
-      Put<uint16_t>(
-          bytes, counter_at,
-          static_cast<uint16_t>(counter + (access.read ? 1 : 0) + (access.written ? both : 0)));
-      return;
+  const CommandKind& kind = kCommands[static_cast<size_t>(datagram.command)];
+  if (kind.addressing == Addressing::kNone) return;
+  bool read = kind.reads, write = kind.writes, was_read = false, was_written = false;
+  if (kind.addressing == Addressing::kLogical) {
+    const EmulatedEsc::Access access =
+        esc.Logical(datagram.logical_address(), data, read, write, now);
+    was_read = access.read;
+    was_written = access.written;
+  } else {
+    const bool broadcast = kind.addressing == Addressing::kBroadcast;
+    const bool addressed =
+        broadcast || (kind.addressing == Addressing::kPosition ? adp == 0 : esc.HasAddress(adp));
+    read = read && addressed;
+    write = write && (kind.reads_one_writes_others ? !addressed : addressed);
+    if (kind.addressing != Addressing::kStation) {
+      Put<uint16_t>(bytes, 2, static_cast<uint16_t>(adp + 1));
     }
-  }
-  const bool positions = datagram.command == Command::kAprd || datagram.command == Command::kApwr ||
-                         datagram.command == Command::kAprw || datagram.command == Command::kArmw ||
-                         merge || datagram.command == Command::kBwr;
-  if (positions) Put<uint16_t>(bytes, 2, static_cast<uint16_t>(adp + 1));
-
-  std::array<uint8_t, kMaxDatagramData> found;
-  const std::span<uint8_t> old = std::span(found).first(data.size());
-  const bool was_read = read && esc.Read(datagram.ado, old, now);
-  const bool was_written = write && esc.Write(datagram.ado, data, now);
-  if (was_read) {
-    for (size_t i = 0; i < data.size(); ++i) {
-      data[i] = static_cast<uint8_t>(merge ? data[i] | old[i] : old[i]);
+    std::array<uint8_t, kMaxDatagramData> found;
+    const std::span<uint8_t> old = std::span(found).first(data.size());
+    was_read = read && esc.Read(datagram.ado, old, now);
+    was_written = write && esc.Write(datagram.ado, data, now);
+    for (size_t i = 0; was_read && i < data.size(); ++i) {
+      data[i] = static_cast<uint8_t>(broadcast ? data[i] | old[i] : old[i]);
     }
   }
   const auto counter = Get<uint16_t>(bytes, counter_at);

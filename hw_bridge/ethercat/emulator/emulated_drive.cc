@@ -3,9 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <utility>
-
-#include "hw_bridge/ethercat/process_image.h"
 
 namespace poise::ethercat {
 namespace {
@@ -20,6 +17,14 @@ constexpr uint8_t kTx = ObjectDictionary::kTxMappable;
 uint32_t Counts(double angle, uint32_t counts_per_turn) {
   const double counts = std::floor(angle / (2 * std::numbers::pi) * counts_per_turn);
   return static_cast<uint32_t>(static_cast<int64_t>(std::fmod(counts, 4294967296.0)));
+}
+
+/// The state that a controlword's bits lead to, of a drive without a fault.
+DriveState AskedFor(uint16_t controlword) {
+  if ((controlword & 0x02) == 0) return DriveState::kSwitchOnDisabled;
+  if ((controlword & 0x04) == 0) return DriveState::kQuickStopActive;
+  if ((controlword & 0x01) == 0) return DriveState::kReadyToSwitchOn;
+  return (controlword & 0x08) == 0 ? DriveState::kSwitchedOn : DriveState::kOperationEnabled;
 }
 
 }  // namespace
@@ -94,10 +99,6 @@ void EmulatedDrive::TriggerFault(uint16_t error) {
   Schedule(DriveState::kFault, now_);
 }
 
-std::optional<uint16_t> EmulatedDrive::TakeEmergency() {
-  return std::exchange(emergency_, std::nullopt);
-}
-
 void EmulatedDrive::Enter(DriveState state) {
   state_ = state;
   next_.reset();
@@ -113,6 +114,7 @@ void EmulatedDrive::AdvanceTo(int64_t now, bool outputs_valid) {
   const double elapsed_ms =
       static_cast<double>(std::max<int64_t>(now - now_, 0)) / kNanosecondsPerMs;
   now_ = std::max(now, now_);
+  load_->AdvanceTo(now_);
   UpdateState(now_, outputs_valid);
   UpdateTorque(elapsed_ms);
   Report();
@@ -144,48 +146,32 @@ void EmulatedDrive::UpdateState(int64_t now, bool outputs_valid) {
 }
 
 void EmulatedDrive::Follow(uint16_t controlword, bool reset_edge, int64_t now) {
-  const bool voltage = (controlword & 0x02) != 0;
-  const bool no_quick_stop = (controlword & 0x04) != 0;
-  const bool switch_on = (controlword & 0x01) != 0;
-  const bool enable = (controlword & 0x08) != 0;
-  const bool shutdown_or_more = voltage && no_quick_stop;
+  const DriveState asked = AskedFor(controlword);
   std::optional<DriveState> wanted;
   switch (state_) {
     case DriveState::kSwitchOnDisabled:
-      if (shutdown_or_more && !switch_on && !sto_) wanted = DriveState::kReadyToSwitchOn;
+      if (asked == DriveState::kReadyToSwitchOn && !sto_) wanted = asked;
       break;
     case DriveState::kReadyToSwitchOn:
-      if (!shutdown_or_more) {
-        Enter(DriveState::kSwitchOnDisabled);
-      } else if (switch_on) {
-        wanted = DriveState::kSwitchedOn;
+    case DriveState::kSwitchedOn: {
+      // Up by one state at a time, down at once.
+      const DriveState target =
+          asked == DriveState::kQuickStopActive ? DriveState::kSwitchOnDisabled : asked;
+      if (target > state_) {
+        wanted = static_cast<DriveState>(static_cast<int>(state_) + 1);
+      } else if (target < state_) {
+        Enter(target);
       }
       break;
-    case DriveState::kSwitchedOn:
-      if (!shutdown_or_more) {
-        Enter(DriveState::kSwitchOnDisabled);
-      } else if (!switch_on) {
-        Enter(DriveState::kReadyToSwitchOn);
-      } else if (enable) {
-        wanted = DriveState::kOperationEnabled;
-      }
-      break;
+    }
     case DriveState::kOperationEnabled:
       // Ways out of it take no time: torque ends with the command.
-      if (!voltage) {
-        Enter(DriveState::kSwitchOnDisabled);
-      } else if (!no_quick_stop) {
-        Enter(DriveState::kQuickStopActive);
-      } else if (!switch_on) {
-        Enter(DriveState::kReadyToSwitchOn);
-      } else if (!enable) {
-        Enter(DriveState::kSwitchedOn);
-      }
+      if (asked != state_) Enter(asked);
       return;
     case DriveState::kQuickStopActive:
       // 605A = 2: once stopped, switch on disabled.
-      if (!voltage) {
-        Enter(DriveState::kSwitchOnDisabled);
+      if (asked == DriveState::kSwitchOnDisabled) {
+        Enter(asked);
       } else {
         Schedule(DriveState::kSwitchOnDisabled, now);
       }
@@ -226,9 +212,7 @@ void EmulatedDrive::UpdateTorque(double elapsed_ms) {
   const double limit = TorqueLimit(elapsed_ms);
   limited_ = false;
   double wanted = 0;
-  const bool follows = state_ == DriveState::kOperationEnabled &&
-                       static_cast<int8_t>(mode_display_->value) == kModeCyclicTorque;
-  if (follows) {
+  if (follows()) {
     const auto target = static_cast<double>(static_cast<int16_t>(target_torque_->value));
     wanted = std::clamp(target, -limit, limit);
     limited_ = wanted != target;
@@ -248,9 +232,7 @@ void EmulatedDrive::Report() {
   status |= kStatusRemote;
   if (!sto_) status |= kStatusVoltageEnabled;
   if (limited_) status |= kStatusInternalLimit;
-  const bool follows = state_ == DriveState::kOperationEnabled &&
-                       static_cast<int8_t>(mode_display_->value) == kModeCyclicTorque;
-  if (follows) status |= kStatusFollows;
+  if (follows()) status |= kStatusFollows;
   statusword_->value = status;
   const double rated = config_.rated_torque() * 1e-6;  // N·m of one per mille
   const double shown = load_->MeasuredTorque(torque_ * rated) / rated;

@@ -4,10 +4,12 @@
 #include <cstdint>
 #include <deque>
 #include <optional>
+#include <utility>
 
 #include "hw_bridge/ethercat/cia402.h"
 #include "hw_bridge/ethercat/emulator/emulator.pb.h"
 #include "hw_bridge/ethercat/emulator/object_dictionary.h"
+#include "hw_bridge/ethercat/process_image.h"
 
 namespace poise::ethercat {
 
@@ -15,6 +17,8 @@ namespace poise::ethercat {
 class MotorLoad {
  public:
   virtual ~MotorLoad() = default;
+  /// Lets time pass with the torque as it is; ns, never decreasing.
+  virtual void AdvanceTo(int64_t now) { static_cast<void>(now); }
   /// N·m at the motor shaft, held until the next call.
   virtual void SetTorque(double torque) = 0;
   virtual double position() const = 0;  ///< rad, of the motor shaft
@@ -50,7 +54,7 @@ class EmulatedDrive {
   /// The greatest magnitude since the start.
   double greatest_torque_per_mille() const { return greatest_torque_; }
   /// A fault's code, once for each fault.
-  std::optional<uint16_t> TakeEmergency();
+  std::optional<uint16_t> TakeEmergency() { return std::exchange(emergency_, std::nullopt); }
 
  private:
   void UpdateState(int64_t now, bool outputs_valid);
@@ -60,6 +64,11 @@ class EmulatedDrive {
   void UpdateTorque(double elapsed_ms);
   double TorqueLimit(double elapsed_ms);
   void Report();
+  /// Whether the target torque counts.
+  bool follows() const {
+    return state_ == DriveState::kOperationEnabled &&
+           static_cast<int8_t>(mode_display_->value) == kModeCyclicTorque;
+  }
 
   EmulatedDriveConfig config_;
   MotorLoad* load_;

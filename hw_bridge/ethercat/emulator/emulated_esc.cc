@@ -16,10 +16,6 @@ bool IsCounter(size_t address) {
          address == reg::kWatchdogCounter || address == reg::kWatchdogCounter + 1U;
 }
 
-void CountUp(uint8_t* counter) {
-  if (*counter < 0xFF) ++*counter;
-}
-
 bool Overlap(size_t a, size_t a_size, size_t b, size_t b_size) {
   return a < b + b_size && b < a + a_size;
 }
@@ -65,14 +61,15 @@ const std::array<bool, kRegisters>& Writable() {
 
 }  // namespace
 
-EmulatedEsc::EmulatedEsc(const Options& options) : options_(options) {
+EmulatedEsc::EmulatedEsc(const EmulatedDriveConfig& config, std::vector<uint16_t> eeprom)
+    : config_(config), eeprom_(std::move(eeprom)) {
   memory_[reg::kType] = 0x11;  // an ET1100's kind
   memory_[reg::kFmmuCount] = kNumFmmus;
   memory_[reg::kSyncManagerCount] = kNumSyncManagers;
   memory_[reg::kRamSize] = 8;
-  memory_[reg::kPortDescriptor] = 0xFF;                       // all ports are MII
-  memory_[reg::kFeatures] = options.has_clock ? 0x0C : 0x00;  // distributed clocks, 64 bits
-  Put<uint16_t>(memory_, reg::kStationAlias, options.alias);
+  memory_[reg::kPortDescriptor] = 0xFF;  // all ports are MII
+  memory_[reg::kFeatures] = config.has_clock() ? kFeatureClock | kFeature64Bits : 0;
+  Put<uint16_t>(memory_, reg::kStationAlias, static_cast<uint16_t>(config.alias()));
   memory_[reg::kDlControl] = 1;  // frames of other types are destroyed
   SetPorts({true, false, false, false});
   Put<uint16_t>(memory_, reg::kWatchdogDivider, 2498);
@@ -84,7 +81,7 @@ EmulatedEsc::EmulatedEsc(const Options& options) : options_(options) {
   memory_[reg::kDcTimeFilter] = 0x04;
   memory_[reg::kDcSpeedFilter] = 0x0C;
   SetAlStatus(static_cast<uint8_t>(AlState::kInit), AlStatusCode::kNone);
-  local_ = static_cast<double>(options.clock_start);
+  local_ = static_cast<double>(config.clock_start());
 }
 
 void EmulatedEsc::SetPorts(const std::array<bool, kNumPorts>& linked) {
@@ -94,13 +91,9 @@ void EmulatedEsc::SetPorts(const std::array<bool, kNumPorts>& linked) {
   for (size_t i = 0; i < linked.size(); ++i) {
     const auto link = static_cast<uint16_t>(1U << (4 + i));
     status |= static_cast<uint16_t>(linked[i] ? link | 0x0200U << (2 * i) : 0x0100U << (2 * i));
-    if (!linked[i] && (before & link) != 0) CountUp(&memory_[reg::kLostLinks + i]);
+    if (!linked[i] && (before & link) != 0) CountUp(reg::kLostLinks + i);
   }
   Put<uint16_t>(memory_, reg::kDlStatus, status);
-}
-
-void EmulatedEsc::CountReceiveError(int port) {
-  CountUp(&memory_[reg::kReceiveErrors + 2 * static_cast<size_t>(port)]);
 }
 
 bool EmulatedEsc::HasAddress(uint16_t station) const {
@@ -157,7 +150,6 @@ bool EmulatedEsc::Read(uint16_t address, std::span<uint8_t> data, int64_t now) {
   const Rule rule = SyncManagerRule(address, data.size(), false, &manager);
   if (rule == Rule::kRefused) return false;
   if (address < kRegisters) {
-    UpdateEeprom();
     Put<int64_t>(memory_, reg::kDcSystemTime, SystemTime());
   }
   std::copy_n(memory_.begin() + address, data.size(), data.begin());
@@ -206,7 +198,7 @@ bool EmulatedEsc::Refuses(size_t address, size_t size) const {
   const bool applications = (memory_[reg::kEepromConfig] & kEepromApplication) != 0;
   if (applications && Overlap(address, size, reg::kEepromControl, 14)) return true;
   const bool clock = address >= reg::kDcReceiveTime && address < reg::kDcReceiveTime + 0x100U;
-  return clock && !options_.has_clock;
+  return clock && !config_.has_clock();
 }
 
 bool EmulatedEsc::WriteRegisters(size_t address, std::span<const uint8_t> data) {
@@ -241,7 +233,7 @@ void EmulatedEsc::AfterWrite(size_t address, size_t size, std::span<const uint8_
     uint16_t status = kEeprom8Bytes;
     if ((command & 0x0700) == kEepromReadCommand) {
       status |= kEepromBusy;
-      eeprom_ready_ = now_ + options_.eeprom_time;
+      eeprom_ready_ = now_ + static_cast<int64_t>(config_.eeprom_time() * 1e3);
     } else if ((command & 0x0700) != 0) {
       status |= 0x2000;  // command error: nothing but reading is known
     }
@@ -294,7 +286,7 @@ EmulatedEsc::Access EmulatedEsc::Logical(uint32_t address, std::span<uint8_t> da
 void EmulatedEsc::AdvanceTo(int64_t now) {
   if (now > now_) {
     const double step = static_cast<double>(now - now_);
-    local_ += step * (1 + options_.clock_error * 1e-6);
+    local_ += step * (1 + config_.clock_error() * 1e-6);
     adjustment_ += step * rate_;
     now_ = now;
   }
@@ -321,7 +313,7 @@ void EmulatedEsc::UpdateEeprom() {
   for (size_t i = 0; i < 4; ++i) {
     const uint64_t at = uint64_t{word} + i;
     Put<uint16_t>(memory_, reg::kEepromData + 2 * i,
-                  at < options_.eeprom.size() ? options_.eeprom[at] : uint16_t{0xFFFF});
+                  at < eeprom_.size() ? eeprom_[at] : uint16_t{0xFFFF});
   }
   Put<uint16_t>(memory_, reg::kEepromControl, kEeprom8Bytes);
 }
@@ -333,14 +325,14 @@ void EmulatedEsc::UpdateWatchdog() {
   watchdog_running_ = false;
   watchdog_expired_ = true;
   memory_[reg::kWatchdogStatus] = 0;
-  CountUp(&memory_[reg::kWatchdogCounter]);
+  CountUp(reg::kWatchdogCounter);
 }
 
 void EmulatedEsc::LatchReceiveTimes(const std::array<std::optional<int64_t>, kNumPorts>& ports,
                                     int64_t unit) {
-  if (!options_.has_clock) return;
+  if (!config_.has_clock()) return;
   AdvanceTo(unit);
-  const double rate = 1 + options_.clock_error * 1e-6;
+  const double rate = 1 + config_.clock_error() * 1e-6;
   const auto local = [&](int64_t time) {
     return static_cast<int64_t>(std::llround(local_ + static_cast<double>(time - now_) * rate));
   };
@@ -371,8 +363,6 @@ void EmulatedEsc::CompareSystemTime(std::span<const uint8_t> data) {
   rate_ = std::clamp(rate_ - 0.02 * difference / elapsed, -1e-3, 1e-3);
 }
 
-bool EmulatedEsc::sync0_enabled() const { return (memory_[reg::kDcActivation] & 0x03) == 0x03; }
-
 void EmulatedEsc::StartSync0() {
   next_sync0_.reset();
   if (!sync0_enabled()) return;
@@ -381,18 +371,12 @@ void EmulatedEsc::StartSync0() {
   if (start > SystemTime()) next_sync0_ = start;
 }
 
-bool EmulatedEsc::TakeSync0() { return std::exchange(sync0_pulsed_, false); }
-
-std::optional<uint16_t> EmulatedEsc::TakeAlControl() {
-  return std::exchange(al_control_, std::nullopt);
-}
-
 void EmulatedEsc::SetAlStatus(uint8_t status, AlStatusCode code) {
   Put<uint16_t>(memory_, reg::kAlStatus, status);
   Put<uint16_t>(memory_, reg::kAlStatusCode, static_cast<uint16_t>(code));
 }
 
-std::span<const uint8_t> EmulatedEsc::Buffer(int index) const {
+std::span<uint8_t> EmulatedEsc::Buffer(int index) {
   const SyncManagerSettings sync = sync_manager(index);
   if (!sync.active || sync.start < kRegisters || sync.start + size_t{sync.length} > kMemory) {
     return {};
@@ -415,27 +399,14 @@ std::span<const uint8_t> EmulatedEsc::TakeMailbox() {
 }
 
 std::span<uint8_t> EmulatedEsc::BeginMailboxReply() {
-  const std::span<const uint8_t> buffer = Buffer(kMailboxIn);
-  if (buffer.empty() || (SyncByte(kMailboxIn, 5) & kSmStatusFull) != 0) return {};
-  return std::span(memory_).subspan(sync_manager(kMailboxIn).start, buffer.size());
+  if ((SyncByte(kMailboxIn, 5) & kSmStatusFull) != 0) return {};
+  return Buffer(kMailboxIn);
 }
-
-void EmulatedEsc::EndMailboxReply() { SyncByte(kMailboxIn, 5) |= kSmStatusFull; }
-
-bool EmulatedEsc::TakeRepeatRequest() { return std::exchange(repeat_requested_, false); }
 
 void EmulatedEsc::AcknowledgeRepeat() {
   uint8_t& pdi = SyncByte(kMailboxIn, 7);
   pdi = static_cast<uint8_t>((pdi & ~kSmRepeatRequest) |
                              (SyncByte(kMailboxIn, 6) & kSmRepeatRequest));
 }
-
-std::span<uint8_t> EmulatedEsc::process_inputs() {
-  const std::span<const uint8_t> buffer = Buffer(input_manager_);
-  if (buffer.empty()) return {};
-  return std::span(memory_).subspan(sync_manager(input_manager_).start, buffer.size());
-}
-
-bool EmulatedEsc::TakeOutputsWritten() { return std::exchange(outputs_written_, false); }
 
 }  // namespace poise::ethercat

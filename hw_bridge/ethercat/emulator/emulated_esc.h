@@ -5,8 +5,10 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
+#include "hw_bridge/ethercat/emulator/emulator.pb.h"
 #include "hw_bridge/ethercat/links/bytes.h"
 #include "hw_bridge/ethercat/registers.h"
 
@@ -15,15 +17,8 @@ namespace poise::ethercat {
 /// A subset: FMMUs map whole bytes; three-buffer sync managers show the last write at once.
 class EmulatedEsc {
  public:
-  struct Options {
-    std::vector<uint16_t> eeprom;  ///< words of the SII
-    int64_t eeprom_time = 0;       ///< ns that reading a word takes
-    double clock_error = 0;        ///< of its oscillator, ppm
-    int64_t clock_start = 0;       ///< ns, its local time at time 0
-    bool has_clock = true;
-    uint16_t alias = 0;  ///< station alias
-  };
-  explicit EmulatedEsc(const Options& options);
+  /// `eeprom`: words of the SII.
+  EmulatedEsc(const EmulatedDriveConfig& config, std::vector<uint16_t> eeprom);
 
   // The master's side. `now`: ns, when the frame passes this slave; never decreases.
 
@@ -49,10 +44,10 @@ class EmulatedEsc {
   /// Which ports have a link. One that loses it counts it.
   void SetPorts(const std::array<bool, kNumPorts>& linked);
   /// A damaged frame has come in at a port.
-  void CountReceiveError(int port);
+  void CountReceiveError(int port) { CountUp(reg::kReceiveErrors + 2 * static_cast<size_t>(port)); }
   bool al_control_pending() const { return al_control_.has_value(); }
   /// What the master has written to AL control since the last call.
-  std::optional<uint16_t> TakeAlControl();
+  std::optional<uint16_t> TakeAlControl() { return std::exchange(al_control_, std::nullopt); }
   void SetAlStatus(uint8_t status, AlStatusCode code);
 
   struct SyncManagerSettings {
@@ -70,28 +65,28 @@ class EmulatedEsc {
   std::span<const uint8_t> TakeMailbox();
   /// Where the application puts a message for the master; empty when the mailbox is full or off.
   std::span<uint8_t> BeginMailboxReply();
-  void EndMailboxReply();
+  void EndMailboxReply() { SyncByte(kMailboxIn, 5) |= kSmStatusFull; }
   /// The master has asked for the last message once more; true once per request.
-  bool TakeRepeatRequest();
+  bool TakeRepeatRequest() { return std::exchange(repeat_requested_, false); }
   void AcknowledgeRepeat();
 
   /// Buffers of the process data; empty when the sync manager is not active.
-  std::span<const uint8_t> process_outputs() const { return Buffer(output_manager_); }
+  std::span<const uint8_t> process_outputs() { return Buffer(output_manager_); }
   /// Which sync managers have the process data: those after the mailboxes, unless there are none.
   void SetProcessManagers(int outputs, int inputs) {
     output_manager_ = outputs;
     input_manager_ = inputs;
   }
-  std::span<uint8_t> process_inputs();
+  std::span<uint8_t> process_inputs() { return Buffer(input_manager_); }
   /// Whether the master has written all process outputs since the last call.
-  bool TakeOutputsWritten();
+  bool TakeOutputsWritten() { return std::exchange(outputs_written_, false); }
   bool watchdog_expired() const { return watchdog_expired_; }
   void RestartWatchdog() { watchdog_running_ = watchdog_expired_ = false; }
 
-  bool sync0_enabled() const;
+  bool sync0_enabled() const { return (memory_[reg::kDcActivation] & 0x03) == 0x03; }
   uint32_t sync0_cycle() const { return Get<uint32_t>(memory_, reg::kDcSync0Cycle); }
   /// Whether SYNC0 has pulsed since the last call.
-  bool TakeSync0();
+  bool TakeSync0() { return std::exchange(sync0_pulsed_, false); }
   /// System time, ns, of the next pulse; nullopt: none.
   std::optional<int64_t> next_sync0() const { return next_sync0_; }
   /// ns, this slave's copy of the common time.
@@ -103,7 +98,10 @@ class EmulatedEsc {
   enum class Rule { kFree, kRefused, kBuffer };
   /// How the sync managers treat an access by the master; `manager`: whose buffer it is.
   Rule SyncManagerRule(size_t address, size_t size, bool write, int* manager) const;
-  std::span<const uint8_t> Buffer(int index) const;
+  std::span<uint8_t> Buffer(int index);
+  void CountUp(size_t address) {
+    if (memory_[address] < 0xFF) ++memory_[address];
+  }
   uint8_t& SyncByte(int index, size_t offset);
   bool Refuses(size_t address, size_t size) const;
   bool WriteRegisters(size_t address, std::span<const uint8_t> data);
@@ -113,7 +111,8 @@ class EmulatedEsc {
   void CompareSystemTime(std::span<const uint8_t> data);
   void StartSync0();
 
-  Options options_;
+  EmulatedDriveConfig config_;
+  std::vector<uint16_t> eeprom_;
   int output_manager_ = kProcessOut, input_manager_ = kProcessIn;
   std::array<uint8_t, kMemory> memory_{};
   int64_t now_ = 0;  // ns, true time

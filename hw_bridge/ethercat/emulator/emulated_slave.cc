@@ -1,6 +1,7 @@
 #include "hw_bridge/ethercat/emulator/emulated_slave.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "hw_bridge/ethercat/process_image.h"
 
@@ -98,32 +99,11 @@ std::vector<uint16_t> MakeEeprom(const EmulatedDriveConfig& config) {
 
 SdoAbort InRange(bool good) { return good ? SdoAbort::kNone : SdoAbort::kValueRange; }
 
-int Rank(AlState state) {
-  switch (state) {
-    case AlState::kInit:
-      return 0;
-    case AlState::kPreOp:
-      return 1;
-    case AlState::kSafeOp:
-      return 2;
-    case AlState::kOp:
-      return 3;
-    case AlState::kBoot:
-      break;
-  }
-  return -1;
-}
-
 }  // namespace
 
 EmulatedSlave::EmulatedSlave(const EmulatedDriveConfig& config, MotorLoad* load)
     : config_(config),
-      esc_({.eeprom = MakeEeprom(config),
-            .eeprom_time = static_cast<int64_t>(config.eeprom_time() * 1e3),
-            .clock_error = config.clock_error(),
-            .clock_start = config.clock_start(),
-            .has_clock = config.has_clock(),
-            .alias = static_cast<uint16_t>(config.alias())}),
+      esc_(config, MakeEeprom(config)),
       drive_(config, config.other() ? &unused_ : &objects_, load),
       coe_(&objects_, kMailboxSize, config.complete_access()) {
   if (!config_.mailbox()) {
@@ -208,7 +188,7 @@ void EmulatedSlave::AddAssignment(uint16_t assign, const std::vector<uint16_t>& 
     const uint32_t pdo = i <= assigned.size() ? assigned[i - 1U] : 0U;
     objects_.Add({assign, i}, 2, kRw, pdo, [=, this](uint32_t value) {
       if (state_ != AlState::kPreOp) return SdoAbort::kDeviceState;
-      if (objects_.Find({assign, 0})->value != 0) return SdoAbort::kSubindexNotWritable;
+      if (Value(assign, 0) != 0) return SdoAbort::kSubindexNotWritable;
       const bool known = std::find(allowed.begin(), allowed.end(), value) != allowed.end();
       return known ? SdoAbort::kNone : SdoAbort::kValueRange;
     });
@@ -229,14 +209,14 @@ void EmulatedSlave::AddFreePdo(uint16_t assign, uint16_t pdo, uint8_t mappable) 
   objects_.SetName(pdo, "PDO mapping");
   objects_.Add({pdo, 0}, 1, kRw, 0, [=, this](uint32_t count) {
     if (state_ != AlState::kPreOp) return SdoAbort::kDeviceState;
-    for (uint32_t i = 1; i <= objects_.Find({assign, 0})->value; ++i) {
-      if (objects_.Find({assign, static_cast<uint8_t>(i)})->value == pdo) {
+    for (uint32_t i = 1; i <= Value(assign, 0); ++i) {
+      if (Value(assign, i) == pdo) {
         return SdoAbort::kUnsupportedAccess;
       }
     }
     if (count > kMostMapped) return SdoAbort::kPdoTooLong;
     for (uint32_t i = 1; i <= count; ++i) {
-      const uint32_t mapping = objects_.Find({pdo, static_cast<uint8_t>(i)})->value;
+      const uint32_t mapping = Value(pdo, i);
       const SdoAbort abort = CheckMapping(mapping, mappable);
       if (abort != SdoAbort::kNone) return abort;
     }
@@ -247,7 +227,7 @@ void EmulatedSlave::AddFreePdo(uint16_t assign, uint16_t pdo, uint8_t mappable) 
   for (uint8_t i = 1; i <= kMostMapped; ++i) {
     objects_.Add({pdo, i}, 4, kRw, 0, [=, this](uint32_t mapping) {
       if (state_ != AlState::kPreOp) return SdoAbort::kDeviceState;
-      if (objects_.Find({pdo, 0})->value != 0) return SdoAbort::kSubindexNotWritable;
+      if (Value(pdo, 0) != 0) return SdoAbort::kSubindexNotWritable;
       return CheckMapping(mapping, mappable);
     });
   }
@@ -289,12 +269,12 @@ SdoAbort EmulatedSlave::CheckMapping(uint32_t mapping, uint8_t mappable) const {
 
 EmulatedSlave::ProcessData EmulatedSlave::FindMapped(uint16_t assign) {
   ProcessData data;
-  const uint32_t pdos = objects_.Find({assign, 0})->value;
+  const uint32_t pdos = Value(assign, 0);
   for (uint32_t p = 1; p <= pdos; ++p) {
-    const auto pdo = static_cast<uint16_t>(objects_.Find({assign, static_cast<uint8_t>(p)})->value);
+    const auto pdo = static_cast<uint16_t>(Value(assign, p));
     const Object* count = objects_.Find({pdo, 0});
     for (uint32_t i = 1; count != nullptr && i <= count->value; ++i) {
-      const uint32_t mapping = objects_.Find({pdo, static_cast<uint8_t>(i)})->value;
+      const uint32_t mapping = Value(pdo, i);
       const size_t bits = mapping & 0xFF;
       data.entries.push_back({objects_.Find({static_cast<uint16_t>(mapping >> 16),
                                              static_cast<uint8_t>(mapping >> 8)}),
@@ -349,11 +329,11 @@ void EmulatedSlave::HandleAlControl(uint16_t control) {
   esc_.SetAlStatus(static_cast<uint8_t>(state_), AlStatusCode::kNone);
   if (wanted == AlState::kBoot) {
     Fail(AlStatusCode::kBootNotSupported);
-  } else if (Rank(wanted) < 0) {
+  } else if (!std::has_single_bit(static_cast<uint8_t>(wanted))) {
     Fail(AlStatusCode::kUnknownState);
-  } else if (Rank(wanted) > Rank(state_) + 1) {
+  } else if (static_cast<int>(wanted) > 2 * static_cast<int>(state_)) {  // each twice the one below
     Fail(AlStatusCode::kInvalidStateChange);
-  } else if (Rank(wanted) <= Rank(state_)) {
+  } else if (wanted <= state_) {
     Enter(wanted);
   } else if (const AlStatusCode code = CheckTransition(wanted); code != AlStatusCode::kNone) {
     Fail(code);
@@ -369,28 +349,24 @@ void EmulatedSlave::HandleAlControl(uint16_t control) {
 }
 
 AlStatusCode EmulatedSlave::CheckTransition(AlState state) {
-  const auto matches = [this](int index, size_t length, uint8_t control, uint8_t mask) {
+  const auto matches = [this](int index, uint16_t start, size_t length, uint8_t control) {
+    constexpr uint8_t kModeAndDirection = kSmModeMask | kSmMasterWrites;
     const EmulatedEsc::SyncManagerSettings sync = esc_.sync_manager(index);
-    return sync.active && sync.length == length && (sync.control & mask) == (control & mask);
+    return sync.active && sync.start == start && sync.length == length &&
+           ((sync.control ^ control) & kModeAndDirection) == 0;
   };
-  constexpr uint8_t kModeAndDirection = kSmModeMask | kSmMasterWrites;
   if (state == AlState::kPreOp) {
-    const bool mailboxes = matches(kMailboxOut, kMailboxSize, kSmMailboxOut, kModeAndDirection) &&
-                           matches(kMailboxIn, kMailboxSize, kSmMailboxIn, kModeAndDirection) &&
-                           esc_.sync_manager(kMailboxOut).start == kMailboxOutStart &&
-                           esc_.sync_manager(kMailboxIn).start == kMailboxInStart;
+    const bool mailboxes = matches(kMailboxOut, kMailboxOutStart, kMailboxSize, kSmMailboxOut) &&
+                           matches(kMailboxIn, kMailboxInStart, kMailboxSize, kSmMailboxIn);
     if (config_.mailbox() && !mailboxes) return AlStatusCode::kInvalidMailboxConfiguration;
   } else if (state == AlState::kSafeOp) {
     outputs_ = FindMapped(object::kRxAssign);
     inputs_ = FindMapped(object::kTxAssign);
     if (outputs_.bits > 0 &&
-        (!matches(output_manager_, outputs_.size(), kSmProcessOut, kModeAndDirection) ||
-         esc_.sync_manager(output_manager_).start != kOutputsStart)) {
+        !matches(output_manager_, kOutputsStart, outputs_.size(), kSmProcessOut)) {
       return AlStatusCode::kInvalidOutputConfiguration;
     }
-    if (inputs_.bits > 0 &&
-        (!matches(input_manager_, inputs_.size(), kSmProcessIn, kModeAndDirection) ||
-         esc_.sync_manager(input_manager_).start != kInputsStart)) {
+    if (inputs_.bits > 0 && !matches(input_manager_, kInputsStart, inputs_.size(), kSmProcessIn)) {
       return AlStatusCode::kInvalidInputConfiguration;
     }
     if (esc_.sync0_enabled() && esc_.sync0_cycle() == 0) return AlStatusCode::kInvalidSync0Cycle;
@@ -403,7 +379,7 @@ void EmulatedSlave::Enter(AlState state) {
   requested_.reset();
   esc_.SetAlStatus(static_cast<uint8_t>(state), AlStatusCode::kNone);
   if (state != AlState::kOp) esc_.RestartWatchdog();
-  if (Rank(state) < Rank(AlState::kPreOp)) {
+  if (state < AlState::kPreOp) {
     // What was under way in the mailbox is gone, an emergency that nobody has read included.
     request_.reset();
     request_counter_ = 0;
@@ -437,7 +413,7 @@ void EmulatedSlave::FinishTransition() {
 }
 
 void EmulatedSlave::AnswerMailbox() {
-  if (!config_.mailbox() || Rank(state_) < Rank(AlState::kPreOp)) return;
+  if (!config_.mailbox() || state_ < AlState::kPreOp) return;
   if (esc_.TakeRepeatRequest()) {
     const std::span<uint8_t> mailbox = esc_.BeginMailboxReply();
     if (mailbox.size() >= last_reply_.size() && !last_reply_.empty()) {
@@ -502,27 +478,18 @@ void EmulatedSlave::ApplyOutputs() {
   if (bytes.size() != outputs_.size()) return;
   for (const Mapped& mapped : outputs_.entries) {
     if (mapped.object == nullptr) continue;
-    uint64_t value = 0;
-    for (size_t i = 0; i < mapped.bits; ++i) {
-      const size_t bit = mapped.bit + i;
-      value |= uint64_t{static_cast<uint8_t>(bytes[bit / 8] >> (bit % 8) & 1)} << i;
-    }
-    mapped.object->value = static_cast<uint32_t>(value);
+    mapped.object->value = static_cast<uint32_t>(GetBits(bytes, mapped.bit, mapped.bits));
   }
 }
 
 void EmulatedSlave::UpdateInputs() {
-  if (Rank(state_) < Rank(AlState::kSafeOp)) return;
+  if (state_ < AlState::kSafeOp) return;
   const std::span<uint8_t> bytes = esc_.process_inputs();
   if (bytes.size() != inputs_.size()) return;
   std::fill(bytes.begin(), bytes.end(), uint8_t{0});
   for (const Mapped& mapped : inputs_.entries) {
     if (mapped.object == nullptr) continue;
-    const uint64_t value = mapped.object->value;
-    for (size_t i = 0; i < mapped.bits && i < 32; ++i) {
-      const size_t bit = mapped.bit + i;
-      bytes[bit / 8] |= static_cast<uint8_t>((value >> i & 1) << (bit % 8));
-    }
+    PutBits(bytes, mapped.bit, mapped.object->value, mapped.bits);
   }
 }
 

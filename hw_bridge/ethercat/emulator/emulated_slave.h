@@ -59,6 +59,9 @@ class EmulatedSlave {
   /// PDOs as configured; objects of a slave that is no drive come with them.
   void AddOwnPdos(uint16_t assign, const google::protobuf::RepeatedPtrField<MappedObject>& objects,
                   uint8_t mappable);
+  uint32_t Value(uint16_t index, uint32_t subindex) const {
+    return objects_.Find({index, static_cast<uint8_t>(subindex)})->value;
+  }
   SdoAbort CheckMapping(uint32_t mapping, uint8_t mappable) const;
   ProcessData FindMapped(uint16_t assign);
 

@@ -45,7 +45,7 @@ TEST(Cia402, DecodesEveryStatuswordAsTheStandardsTable) {
 }
 
 TEST(Cia402, EncodesWhatItDecodes) {
-  for (int i = 0; i < kNumDriveStates - 1; ++i) {
+  for (int i = 1; i < kNumDriveStates; ++i) {
     const auto state = static_cast<DriveState>(i);
     EXPECT_EQ(DecodeState(EncodeState(state)), state);
   }

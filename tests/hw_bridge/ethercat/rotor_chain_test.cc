@@ -1,8 +1,7 @@
 // A chain of drives by itself, as `poise drives emulate` has it: rotors instead of a robot.
-#include "hw_bridge/ethercat/emulator/rotor_chain.h"
-
 #include <gtest/gtest.h>
 
+#include "hw_bridge/ethercat/emulator/rotor.h"
 #include "tests/hw_bridge/ethercat/chain_fixture.h"
 
 namespace poise::ethercat {
@@ -15,23 +14,25 @@ constexpr double kDamping = 1e-3;  // N·m·s/rad
 TEST(RotorChain, ARotorsMomentumIsTheImpulse) {
   Rotor rotor(kInertia, kDamping);
   double impulse = 0;
+  int64_t now = 0;
   for (int i = 0; i < 200; ++i) {
     const double torque = 0.1 * (i % 7) - 0.2;
-    const double step = 1e-4 * (1 + i % 5);
+    const int64_t step = 100'000 * (1 + i % 5);  // ns
     rotor.SetTorque(torque);
-    rotor.Advance(step);
-    impulse += torque * step;
+    rotor.AdvanceTo(now += step);
+    impulse += torque * 1e-9 * static_cast<double>(step);
   }
   ASSERT_GT(std::abs(impulse), 1e-3);
   EXPECT_NEAR(kInertia * rotor.velocity() + kDamping * rotor.position(), impulse, 1e-12);
   rotor.SetTorque(0.05);
-  rotor.Advance(100);
+  rotor.AdvanceTo(now + 100 * kSecond);
   EXPECT_NEAR(rotor.velocity(), 0.05 / kDamping, 1e-9);
 }
 
 TEST(RotorChain, TurnsUnderAMasterWithoutARobot) {
   const MasterConfig config = MakeMasterConfig(2);
-  RotorChain chain(MakeChainConfig(2), kInertia, kDamping);
+  std::vector<Rotor> rotors(2, {kInertia, kDamping});
+  EmulatedChain chain(MakeChainConfig(2), std::vector<MotorLoad*>{&rotors[0], &rotors[1]});
   MemoryLink link(&chain);
   Master master(&link, config);
   master.Start();
@@ -54,15 +55,14 @@ TEST(RotorChain, TurnsUnderAMasterWithoutARobot) {
   drive(50, 0);
   const int32_t before = master.inputs(0).position;
   drive(20, 100);  // 0.15 N·m of 1.5
-  EXPECT_NEAR(chain.rotor(0).torque(), 0.15, 1e-9);
-  EXPECT_NEAR(chain.rotor(1).torque(), -0.15, 1e-9);
-  const double momentum =
-      kInertia * chain.rotor(0).velocity() + kDamping * chain.rotor(0).position();
+  EXPECT_NEAR(rotors[0].torque(), 0.15, 1e-9);
+  EXPECT_NEAR(rotors[1].torque(), -0.15, 1e-9);
+  const double momentum = kInertia * rotors[0].velocity() + kDamping * rotors[0].position();
   const int64_t from = link.Now();
   drive(50, 100);
   const double impulse = 0.15 * 1e-9 * static_cast<double>(link.Now() - from);
-  EXPECT_NEAR(kInertia * chain.rotor(0).velocity() + kDamping * chain.rotor(0).position(),
-              momentum + impulse, 0.02 * impulse);
+  EXPECT_NEAR(kInertia * rotors[0].velocity() + kDamping * rotors[0].position(), momentum + impulse,
+              0.02 * impulse);
   EXPECT_GT(master.inputs(0).position, before);
   EXPECT_LT(master.inputs(1).position, 0);
   EXPECT_TRUE(master.Stop());
