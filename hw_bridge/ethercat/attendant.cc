@@ -26,8 +26,7 @@ Attendant::Attendant(const MasterConfig* config, const SlaveSetup* setup, ClockP
       lockstep_(lockstep),
       say_(std::move(say)),
       transactions_(&slot_, timeouts.state, kAttempts),
-      complaints_(slaves.size()),
-      left_at_(slaves.size(), -1) {
+      complaints_(slaves.size()) {
   for (const SlaveAccess& slave : slaves) {
     slaves_.push_back(slave.Through(&transactions_));
     diagnoses_.emplace_back().al = static_cast<uint8_t>(AlState::kOp);
@@ -90,12 +89,7 @@ bool Attendant::NoteState(size_t slave) {
   shown.online = counter && *counter == 1;
   if (shown.online) shown.al = uint32_t{bytes[0]} | uint32_t{Get<uint16_t>(bytes, 4)} << 16;
   const bool operational = shown.online && bytes[0] == static_cast<uint8_t>(AlState::kOp);
-  if (operational) {
-    left_at_[slave] = -1;
-    complaints_[slave].clear();
-  } else if (left_at_[slave] < 0) {
-    left_at_[slave] = slot_.Now();
-  }
+  if (operational) complaints_[slave].clear();
   return operational;
 }
 

@@ -84,7 +84,6 @@ class Attendant {
   std::vector<SlaveAccess> slaves_;
   std::deque<SlaveDiagnosis> diagnoses_;
   std::vector<std::string> complaints_;  // the last line of each slave
-  std::vector<int64_t> left_at_;         // ns, when a slave was first seen outside OP; -1: in OP
   std::atomic<bool> trouble_{false}, ended_{false};
   std::atomic<int64_t> recoveries_{0};
   std::thread thread_;

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <iterator>
-#include <utility>
 
 #include "hw_bridge/ethercat/links/bytes.h"
+#include "hw_bridge/ethercat/registers.h"
 
 namespace poise::ethercat {
 namespace {
@@ -224,7 +224,7 @@ std::optional<CoeMessage> DecodeCoe(std::span<const uint8_t> payload) {
 }
 
 std::string_view SdoAbortText(uint32_t code) {
-  constexpr std::pair<uint32_t, std::string_view> kTexts[] = {
+  constexpr CodeText kTexts[] = {
       {0x05030000, "toggle bit not changed"},
       {0x05040000, "SDO protocol timeout"},
       {0x05040001, "client/server command specifier not valid or unknown"},
@@ -256,9 +256,7 @@ std::string_view SdoAbortText(uint32_t code) {
       {0x08000022, "data cannot be transferred or stored because of the present device state"},
       {0x08000023, "object dictionary generation fails or no object dictionary is present"},
   };
-  const auto* found = std::find_if(std::begin(kTexts), std::end(kTexts),
-                                   [code](const auto& entry) { return entry.first == code; });
-  return found != std::end(kTexts) ? found->second : "unknown SDO abort code";
+  return TextOf(kTexts, code, "unknown SDO abort code");
 }
 
 }  // namespace poise::ethercat

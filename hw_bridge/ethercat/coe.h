@@ -36,15 +36,12 @@ constexpr uint8_t NextMailboxCounter(uint8_t counter) {
   return static_cast<uint8_t>(counter >= 7 ? 1 : counter + 1);
 }
 
-/// Details of a mailbox error (ETG.1000.4, table 30).
+/// Details of a mailbox error (ETG.1000.4, table 30) that a slave gives.
 enum class MailboxError : uint16_t {
-  kSyntax = 1,
   kUnsupportedProtocol = 2,
-  kInvalidChannel = 3,
   kServiceNotSupported = 4,
   kInvalidHeader = 5,
   kSizeTooShort = 6,
-  kNoMemory = 7,
   kInvalidSize = 8,
 };
 std::string_view MailboxErrorText(uint16_t detail);
@@ -141,19 +138,15 @@ enum class SdoAbort : uint32_t {
   kToggle = 0x05030000,
   kUnknownCommand = 0x05040001,
   kUnsupportedAccess = 0x06010000,
-  kWriteOnly = 0x06010001,
   kReadOnly = 0x06010002,
   kSubindexNotWritable = 0x06010003,
-  kNoCompleteAccess = 0x06010004,
   kNoObject = 0x06020000,
   kNotMappable = 0x06040041,
   kPdoTooLong = 0x06040042,
-  kLengthMismatch = 0x06070010,
   kLengthTooHigh = 0x06070012,
   kLengthTooLow = 0x06070013,
   kNoSubindex = 0x06090011,
   kValueRange = 0x06090030,
-  kGeneral = 0x08000000,
   kDeviceState = 0x08000022,
 };
 /// Text of any SDO abort code; "unknown SDO abort code" when it is none of the standard's.

@@ -31,10 +31,6 @@ class DriveScale {
   double Current(int16_t per_mille) const {
     return sign_ * per_mille * 1e-3 * rated_torque_ / motor_.torque_constant;
   }
-  /// Joint torque of one per mille, N·m: the step of what can be commanded. (54)
-  double TorqueStep() const {
-    return JointTorque(motor_, rated_torque_ * 1e-3 / motor_.torque_constant);
-  }
   /// Limit, per mille, that is not above a current, A.
   uint16_t LimitPerMille(double current) const {
     const double value = std::floor(current * motor_.torque_constant / rated_torque_ * 1e3 + 1e-9);

@@ -409,10 +409,7 @@ bool Master::Send(Exchange exchange) {
       acyclic_.reset();
     }
   }
-  if (!transactions_.link()->Send(builder_.bytes())) {
-    ++counts.send_errors;
-    return false;
-  }
+  if (!transactions_.link()->Send(builder_.bytes())) return false;
   ++counts.sent;
   awaited_ = true;
   return true;
@@ -433,8 +430,8 @@ CycleResult Master::Receive(int64_t deadline) {
       break;
     }
     const FrameReader reader{std::span(received_).first(size)};
-    if (reader.error() != FrameError::kNone) {
-      ++counts.refused[static_cast<size_t>(reader.error())];
+    if (!reader.valid()) {
+      ++counts.refused;
     } else if (!Take(reader, &result)) {
       ++counts.unexpected;
     } else {

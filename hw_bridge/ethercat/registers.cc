@@ -1,29 +1,22 @@
 #include "hw_bridge/ethercat/registers.h"
 
-#include <algorithm>
-#include <iterator>
-#include <utility>
-
 namespace poise::ethercat {
 
-std::string_view Name(AlState state) {
-  switch (state) {
-    case AlState::kInit:
-      return "INIT";
-    case AlState::kPreOp:
-      return "PRE-OP";
-    case AlState::kBoot:
-      return "BOOT";
-    case AlState::kSafeOp:
-      return "SAFE-OP";
-    case AlState::kOp:
-      return "OP";
+std::string_view TextOf(std::span<const CodeText> texts, uint32_t code, std::string_view unknown) {
+  for (const CodeText& each : texts) {
+    if (each.code == code) return each.text;
   }
-  return "unknown";
+  return unknown;
+}
+
+std::string_view Name(AlState state) {
+  constexpr CodeText kNames[] = {
+      {1, "INIT"}, {2, "PRE-OP"}, {3, "BOOT"}, {4, "SAFE-OP"}, {8, "OP"}};
+  return TextOf(kNames, static_cast<uint32_t>(state), "unknown");
 }
 
 std::string_view AlStatusText(uint16_t code) {
-  constexpr std::pair<uint16_t, std::string_view> kTexts[] = {
+  constexpr CodeText kTexts[] = {
       {0x0000, "no error"},
       {0x0001, "unspecified error"},
       {0x0002, "no memory"},
@@ -78,9 +71,7 @@ std::string_view AlStatusText(uint16_t code) {
       {0x0061, "device identification value updated"},
       {0x00F0, "application controller available"},
   };
-  const auto* found = std::find_if(std::begin(kTexts), std::end(kTexts),
-                                   [code](const auto& entry) { return entry.first == code; });
-  return found != std::end(kTexts) ? found->second : "unknown AL status code";
+  return TextOf(kTexts, code, "unknown AL status code");
 }
 
 }  // namespace poise::ethercat

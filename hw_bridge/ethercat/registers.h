@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string_view>
 
 namespace poise::ethercat {
@@ -117,16 +118,20 @@ enum class AlStatusCode : uint16_t {
   kUnknownState = 0x0012,
   kBootNotSupported = 0x0013,
   kInvalidMailboxConfiguration = 0x0016,
-  kInvalidSyncManager = 0x0017,
-  kSyncError = 0x001A,
   kSyncManagerWatchdog = 0x001B,
   kInvalidOutputConfiguration = 0x001D,
   kInvalidInputConfiguration = 0x001E,
-  kInvalidWatchdog = 0x001F,
   kNoSync = 0x002D,
   kInvalidSync0Cycle = 0x0036,
 };
 
+/// What a standard calls one of its codes.
+struct CodeText {
+  uint32_t code;
+  std::string_view text;
+};
+/// The text of a code; `unknown` when it is none of these.
+std::string_view TextOf(std::span<const CodeText> texts, uint32_t code, std::string_view unknown);
 /// "INIT", "PRE-OP", "BOOT", "SAFE-OP", "OP"; "unknown". Takes the state without the error bit.
 std::string_view Name(AlState state);
 /// Text of any AL status code; "unknown AL status code" when it is none of the standard's.

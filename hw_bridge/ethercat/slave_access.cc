@@ -298,12 +298,11 @@ bool SlaveAccess::SetUpMailbox() {
   return true;
 }
 
-uint32_t SlaveAccess::Upload(ObjectAddress object, uint8_t* size) {
+uint32_t SlaveAccess::Upload(ObjectAddress object) {
   const std::vector<uint8_t> bytes = UploadBytes(object);
   if (bytes.empty() || bytes.size() > kExpedited) {
     Fail("reading {}: it has {} bytes, a number has 1 to 4", ethercat::Text(object), bytes.size());
   }
-  if (size != nullptr) *size = static_cast<uint8_t>(bytes.size());
   return static_cast<uint32_t>(GetSized(bytes, 0, bytes.size()));
 }
 

@@ -152,9 +152,8 @@ class SlaveAccess {
   /// Reads where the mailboxes are from the EEPROM and sets the sync managers 0 and 1. False, and
   /// nothing is set: the slave has no CoE.
   bool SetUpMailbox();
-  /// The object's value and, when asked for, its size in bytes (1 to 4), by whatever transfer the
-  /// slave chooses.
-  uint32_t Upload(ObjectAddress object, uint8_t* size = nullptr);
+  /// The object's value, of 1 to 4 bytes, by whatever transfer the slave chooses.
+  uint32_t Upload(ObjectAddress object);
   /// The object's bytes. `complete`: those of all subindices from `object.subindex` (0 or 1) on.
   std::vector<uint8_t> UploadBytes(ObjectAddress object, bool complete = false);
   /// `size`: 1 to 4 bytes.

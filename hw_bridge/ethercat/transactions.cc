@@ -12,7 +12,6 @@ std::optional<uint16_t> Transactions::Execute(Command command, uint16_t adp, uin
         .command = command, .index = NextIndex(), .adp = adp, .ado = ado, .data = data};
     if (!builder_.Add(command, sent.index, adp, ado, data)) return std::nullopt;
     if (!link_->Send(builder_.bytes())) {
-      ++counts_.send_errors;
       // A link that is down for a moment is given the time of a lost frame.
       static_cast<void>(link_->Receive(received_, link_->Now() + timeout_));
       continue;
@@ -29,8 +28,8 @@ bool Transactions::Await(const Datagram& sent, std::span<uint8_t> data, uint16_t
   const int64_t deadline = link_->Now() + timeout_;
   while (const size_t size = link_->Receive(received_, deadline)) {
     FrameReader reader{std::span(received_).first(size)};
-    if (reader.error() != FrameError::kNone) {
-      ++counts_.refused[static_cast<size_t>(reader.error())];
+    if (!reader.valid()) {
+      ++counts_.refused;
       continue;
     }
     const Datagram back = *reader.Next();

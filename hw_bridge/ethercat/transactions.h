@@ -15,10 +15,9 @@ namespace poise::ethercat {
 struct FrameCounts {
   int64_t sent = 0;
   int64_t returned = 0;
-  int64_t lost = 0;         ///< not back by their deadline
-  int64_t send_errors = 0;  ///< refused by the link
-  int64_t unexpected = 0;   ///< well formed, but not the answer to what is awaited (late ones too)
-  std::array<int64_t, kNumFrameErrors> refused{};  ///< by FrameError
+  int64_t lost = 0;        ///< not back by their deadline
+  int64_t unexpected = 0;  ///< well formed, but not the answer to what is awaited (late ones too)
+  int64_t refused = 0;     ///< no frames
 };
 
 /// Sends one datagram at a time and returns what the slaves made of it. Never allocates, never

@@ -20,7 +20,7 @@ class EmulatedChain final : public FrameHandler {
   EmulatedChain(const EmulatedChainConfig& config, std::span<MotorLoad* const> loads);
 
   void AdvanceTo(int64_t now) override;
-  /// Counts by error what is no frame.
+  /// Counts what is no frame.
   bool HandleFrame(std::span<uint8_t> frame, int64_t now) override;
 
   size_t size() const { return slaves_.size(); }
@@ -37,7 +37,7 @@ class EmulatedChain final : public FrameHandler {
   }
 
   int64_t frames() const { return frames_; }
-  int64_t refused(FrameError error) const { return refused_[static_cast<size_t>(error)]; }
+  int64_t refused() const { return refused_; }
 
  private:
   /// A datagram in place, at one slave.
@@ -63,8 +63,7 @@ class EmulatedChain final : public FrameHandler {
   std::vector<std::unique_ptr<EmulatedSlave>> slaves_;
   int64_t hop_;
   size_t connected_;
-  int64_t frames_ = 0;
-  std::array<int64_t, kNumFrameErrors> refused_{};
+  int64_t frames_ = 0, refused_ = 0;
 };
 
 }  // namespace poise::ethercat

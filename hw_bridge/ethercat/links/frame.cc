@@ -9,7 +9,6 @@ namespace {
 
 constexpr uint16_t kLengthMask = 0x07FF;
 constexpr uint16_t kCommandsType = 1;  // in the frame header's upper four bits
-constexpr uint16_t kCirculating = 0x4000;
 constexpr uint16_t kMoreFollows = 0x8000;
 constexpr size_t kLengthField = 6;  // of a datagram's header
 
@@ -51,33 +50,23 @@ std::optional<size_t> FrameBuilder::AddZero(Command command, uint8_t index, uint
 }
 
 FrameReader::FrameReader(std::span<const uint8_t> bytes) : bytes_(bytes) {
-  error_ = Check();
-  if (error_ != FrameError::kNone) return;
-  end_ = kFrameHeader + (Get<uint16_t>(bytes_, 0) & kLengthMask);
-  for (size_t at = kFrameHeader; at < end_; ++num_datagrams_) {
-    at += kDatagramOverhead + (Get<uint16_t>(bytes_, at + kLengthField) & kLengthMask);
-  }
-}
-
-FrameError FrameReader::Check() const {
-  if (bytes_.size() < kFrameHeader) return FrameError::kTooShort;
-  if (bytes_.size() > kMaxFrame) return FrameError::kTooLong;
-  const auto header = Get<uint16_t>(bytes_, 0);
-  if (header >> 12 != kCommandsType) return FrameError::kType;
+  if (bytes.size() < kFrameHeader || bytes.size() > kMaxFrame) return;
+  const auto header = Get<uint16_t>(bytes, 0);
   const size_t end = kFrameHeader + (header & kLengthMask);
-  if (end > bytes_.size() || end == kFrameHeader) return FrameError::kLength;
+  if (header >> 12 != kCommandsType || end > bytes.size()) return;
+  int count = 0;
   bool more = true;
-  for (size_t at = kFrameHeader; at < end;) {
-    if (!more) return FrameError::kChain;
-    if (end - at < kDatagramOverhead) return FrameError::kDatagram;
-    if (bytes_[at] >= kNumCommands) return FrameError::kUnknownCommand;
-    const auto length = Get<uint16_t>(bytes_, at + kLengthField);
+  for (size_t at = kFrameHeader; at < end; ++count) {
+    if (!more || end - at < kDatagramOverhead || bytes[at] >= kNumCommands) return;
+    const auto length = Get<uint16_t>(bytes, at + kLengthField);
     const size_t size = kDatagramOverhead + (length & kLengthMask);
-    if (end - at < size) return FrameError::kDatagram;
+    if (end - at < size) return;
     more = (length & kMoreFollows) != 0;
     at += size;
   }
-  return more ? FrameError::kChain : FrameError::kNone;
+  if (more) return;
+  end_ = end;
+  num_datagrams_ = count;
 }
 
 Datagram FrameReader::At(size_t offset) const {
@@ -87,15 +76,13 @@ Datagram FrameReader::At(size_t offset) const {
           .index = bytes_[offset + 1],
           .adp = Get<uint16_t>(bytes_, offset + 2),
           .ado = Get<uint16_t>(bytes_, offset + 4),
-          .irq = Get<uint16_t>(bytes_, offset + 8),
-          .circulating = (length & kCirculating) != 0,
           .working_counter = Get<uint16_t>(bytes_, offset + kDatagramHeader + size),
           .data = bytes_.subspan(offset + kDatagramHeader, size),
           .offset = offset};
 }
 
 std::optional<Datagram> FrameReader::Next() {
-  if (error_ != FrameError::kNone || position_ >= end_) return std::nullopt;
+  if (position_ >= end_) return std::nullopt;
   const Datagram datagram = At(position_);
   position_ += kDatagramOverhead + datagram.data.size();
   return datagram;

@@ -43,11 +43,9 @@ constexpr uint16_t AutoIncrementAddress(int position) { return static_cast<uint1
 /// A datagram inside a frame's bytes. Spans point into the frame.
 struct Datagram {
   Command command = Command::kNop;
-  uint8_t index = 0;         ///< the master's, returned untouched
-  uint16_t adp = 0;          ///< position, station address, or low word of a logical address
-  uint16_t ado = 0;          ///< register or memory offset, or high word of a logical address
-  uint16_t irq = 0;          ///< event bits of the slaves
-  bool circulating = false;  ///< has passed a slave with a closed port before
+  uint8_t index = 0;  ///< the master's, returned untouched
+  uint16_t adp = 0;   ///< position, station address, or low word of a logical address
+  uint16_t ado = 0;   ///< register or memory offset, or high word of a logical address
   uint16_t working_counter = 0;
   std::span<const uint8_t> data;
   size_t offset = 0;  ///< of the datagram's header in the frame
@@ -82,40 +80,28 @@ class FrameBuilder {
   size_t last_ = 0;  // header of the last datagram, 0: none
 };
 
-/// Why bytes are not a frame.
-enum class FrameError {
-  kNone,
-  kTooShort,        ///< no room for the header
-  kTooLong,         ///< longer than Ethernet carries
-  kType,            ///< not of type 1, EtherCAT commands
-  kLength,          ///< the header's length is beyond the bytes, or 0
-  kDatagram,        ///< a datagram's header or data is beyond the header's length
-  kChain,           ///< "more follows" at the end, or bytes after the last datagram
-  kUnknownCommand,  ///< a command number of no command
-};
-inline constexpr int kNumFrameErrors = 8;
-
 /// Reads a frame of any bytes. Never allocates, never reads outside `bytes`.
 class FrameReader {
  public:
-  /// Checks the whole frame; padding after the header's length is allowed, as Ethernet adds it.
+  /// Checks the whole frame: its type, a header's length within the bytes and above 0, and
+  /// datagrams of known commands that fill that length, the last of which alone says that none
+  /// follows. Padding after it is allowed, as Ethernet adds it.
   explicit FrameReader(std::span<const uint8_t> bytes);
 
-  FrameError error() const { return error_; }
+  /// False: the bytes are no frame.
+  bool valid() const { return num_datagrams_ > 0; }
   int num_datagrams() const { return num_datagrams_; }
-  /// Bytes without padding. Precondition: error() == kNone.
+  /// Bytes without padding. Precondition: valid().
   size_t size() const { return end_; }
-  /// The next datagram, nullopt after the last or when error() != kNone.
+  /// The next datagram, nullopt after the last or when !valid().
   std::optional<Datagram> Next();
 
  private:
-  FrameError Check() const;
   Datagram At(size_t offset) const;
 
   std::span<const uint8_t> bytes_;
   size_t end_ = 0;
   size_t position_ = kFrameHeader;
-  FrameError error_ = FrameError::kNone;
   int num_datagrams_ = 0;
 };
 

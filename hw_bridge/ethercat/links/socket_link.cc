@@ -78,9 +78,7 @@ bool UdpLink::Send(std::span<const uint8_t> frame) {
   const ssize_t sent = sendto(socket_, frame.data(), frame.size(), MSG_NOSIGNAL,
                               listen_ ? reinterpret_cast<const sockaddr*>(&peer_) : nullptr,
                               listen_ ? sizeof(peer_) : 0);
-  const bool complete = sent == static_cast<ssize_t>(frame.size());
-  if (!complete) ++send_errors_;
-  return complete;
+  return sent == static_cast<ssize_t>(frame.size());
 }
 
 size_t UdpLink::Receive(std::span<uint8_t> frame, int64_t deadline) {
@@ -143,10 +141,7 @@ bool RawLink::Send(std::span<const uint8_t> frame) {
               uint8_t{0});
     size = kMinEthernet;
   }
-  const bool complete =
-      send(socket_, out_.data(), size, MSG_NOSIGNAL) == static_cast<ssize_t>(size);
-  if (!complete) ++send_errors_;
-  return complete;
+  return send(socket_, out_.data(), size, MSG_NOSIGNAL) == static_cast<ssize_t>(size);
 }
 
 size_t RawLink::Receive(std::span<uint8_t> frame, int64_t deadline) {

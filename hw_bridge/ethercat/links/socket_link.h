@@ -22,14 +22,12 @@ class SocketLink : public Link {
   int64_t Now() const override;
   /// Readable when a frame has come.
   int fd() const { return socket_; }
-  int64_t send_errors() const { return send_errors_; }
 
  protected:
   /// Waits until the socket is readable or the deadline has passed.
   bool WaitReadable(int64_t deadline) const;
 
   int socket_ = -1;
-  int64_t send_errors_ = 0;
 };
 
 /// EtherCAT over UDP (ETG.1000.4, 5.2.3), IPv4. Needs no privileges.

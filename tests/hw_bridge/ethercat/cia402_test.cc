@@ -274,7 +274,6 @@ TEST(DriveScale, ConvertsAsEquation54) {
   // Rated current gives rated torque: 1000 per mille, 75 N·m at the joint.
   EXPECT_EQ(scale.TorquePerMille(15), 1000);
   EXPECT_DOUBLE_EQ(scale.Current(1000), 15);
-  EXPECT_DOUBLE_EQ(scale.TorqueStep(), 0.075);
   EXPECT_EQ(scale.LimitPerMille(30), 2000);
   EXPECT_EQ(scale.TorquePerMille(0.0074), 0);
   EXPECT_EQ(scale.TorquePerMille(0.0076), 1);

@@ -121,11 +121,7 @@ TEST(EthercatFuzz, SlavesSurviveHostileFrames) {
     }
   }
   EXPECT_GT(accepted, count / 3);
-  int64_t refused = 0;
-  for (int i = 1; i < kNumFrameErrors; ++i) {
-    refused += bench.chain->refused(static_cast<FrameError>(i));
-  }
-  EXPECT_EQ(refused, count - accepted);
+  EXPECT_EQ(bench.chain->refused(), count - accepted);
   // Whatever they did: a master's start makes it a chain again.
   for (size_t i = 0; i < 3; ++i) bench.chain->slave(i).SetSilent(false);
   bench.master->Start();

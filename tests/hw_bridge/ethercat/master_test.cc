@@ -148,9 +148,7 @@ TEST(EthercatMaster, SdoReachesObjectsAndNamesAborts) {
   bench.Start();
   SlaveAccess& slave = bench.master->slave(0);
   EXPECT_EQ(slave.Upload({0x1000, 0}), 0x00020192U);
-  uint8_t size = 0;
-  EXPECT_EQ(slave.Upload({0x1018, 4}, &size), 100U);
-  EXPECT_EQ(size, 4);
+  EXPECT_EQ(slave.Upload({0x1018, 4}), 100U);
   EXPECT_THAT(ErrorOf([&] {
                 slave.Upload({0x5555, 0});
               }),
@@ -284,7 +282,7 @@ TEST(EthercatMaster, CountsLostLateAndDamagedFrames) {
   EXPECT_EQ(bench.master->counts().lost, 2);
   bench.faulty->set_faults({.truncated = 1});
   for (int i = 0; i < 20; ++i) bench.Cycle();
-  EXPECT_GT(bench.master->counts().refused[static_cast<size_t>(FrameError::kLength)], 10);
+  EXPECT_GT(bench.master->counts().refused, 10);
   // A frame that comes a cycle late is not taken for this cycle's.
   bench.faulty->set_faults({.late = 1});
   EXPECT_FALSE(bench.Cycle().returned);
