@@ -147,25 +147,4 @@ bool Endpoint::AwaitSample(int64_t deadline) {
   return dds_waitset_wait(waitset_, ignored, 1, left) > 0;
 }
 
-template <>
-const dds_topic_descriptor_t& DescriptorOf<LowCmd>() {
-  return unitree_hg_msg_dds__LowCmd__desc;
-}
-template <>
-const dds_topic_descriptor_t& DescriptorOf<LowState>() {
-  return unitree_hg_msg_dds__LowState__desc;
-}
-template <>
-const dds_topic_descriptor_t& DescriptorOf<ImuState>() {
-  return unitree_hg_msg_dds__IMUState__desc;
-}
-template <>
-const dds_topic_descriptor_t& DescriptorOf<Request>() {
-  return unitree_api_msg_dds__Request__desc;
-}
-template <>
-const dds_topic_descriptor_t& DescriptorOf<Response>() {
-  return unitree_api_msg_dds__Response__desc;
-}
-
 }  // namespace poise::unitree

@@ -56,13 +56,28 @@ class Endpoint {
 
 /// Type descriptor of a message.
 template <class T>
-const dds_topic_descriptor_t& DescriptorOf();
+inline constexpr const dds_topic_descriptor_t* kDescriptor = nullptr;
+template <>
+inline constexpr const dds_topic_descriptor_t* kDescriptor<LowCmd> =
+    &unitree_hg_msg_dds__LowCmd__desc;
+template <>
+inline constexpr const dds_topic_descriptor_t* kDescriptor<LowState> =
+    &unitree_hg_msg_dds__LowState__desc;
+template <>
+inline constexpr const dds_topic_descriptor_t* kDescriptor<ImuState> =
+    &unitree_hg_msg_dds__IMUState__desc;
+template <>
+inline constexpr const dds_topic_descriptor_t* kDescriptor<Request> =
+    &unitree_api_msg_dds__Request__desc;
+template <>
+inline constexpr const dds_topic_descriptor_t* kDescriptor<Response> =
+    &unitree_api_msg_dds__Response__desc;
 
 template <class T>
 class Writer : private Endpoint {
  public:
   Writer(const Participant& participant, const char* topic, int32_t depth = 1)
-      : Endpoint(participant, Kind::kWriter, DescriptorOf<T>(), topic, depth) {}
+      : Endpoint(participant, Kind::kWriter, *kDescriptor<T>, topic, depth) {}
   /// False when it could not be handed over within a millisecond.
   bool Write(const T& sample) { return WriteSample(&sample); }
 };
@@ -72,7 +87,7 @@ template <class T>
 class Reader : private Endpoint {
  public:
   Reader(const Participant& participant, const char* topic, int32_t depth = 1)
-      : Endpoint(participant, Kind::kReader, DescriptorOf<T>(), topic, depth) {}
+      : Endpoint(participant, Kind::kReader, *kDescriptor<T>, topic, depth) {}
   /// The next sample that has come, if there is one. `sent`, where given: when its writer gave it
   /// away, ns since the epoch by the writer's clock.
   bool Take(T* sample, int64_t* sent = nullptr) { return TakeSample(sample, sent); }
