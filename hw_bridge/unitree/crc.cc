@@ -22,33 +22,23 @@ constexpr std::array<uint32_t, 256> MakeTable() {
 
 constexpr std::array<uint32_t, 256> kTable = MakeTable();
 
-/// The words of a message as a computer of the robot's kind lays it out: little-endian, each field
-/// at a multiple of its size.
+/// A message's words as it lies in memory, where each field is at a multiple of its size.
+template <class T>
 class Words {
  public:
-  template <class T>
-  void Add(T value) {
-    position_ = (position_ + sizeof(T) - 1) / sizeof(T) * sizeof(T);
-    std::memcpy(&bytes_[position_], &value, sizeof(T));
-    position_ += sizeof(T);
+  explicit Words(const T& message) {
+    static_assert(offsetof(T, crc) + sizeof(uint32_t) == sizeof(T));
+    std::memcpy(words_.data(), &message, sizeof(T));
   }
-  template <class T, size_t N>
-  void Add(const T (&values)[N]) {
-    for (const T& value : values) Add(value);
+  /// Takes for 0 what fills up between two fields: bytes `first` up to `last`.
+  void Clear(size_t first, size_t last) {
+    std::memset(reinterpret_cast<std::byte*>(words_.data()) + first, 0, last - first);
   }
-  /// Goes on to a multiple of four bytes, where a structure ends.
-  void FillUp() { position_ = (position_ + 3) / 4 * 4; }
-  uint32_t Crc() {
-    FillUp();
-    std::array<uint32_t, kMost / 4> words;
-    std::memcpy(words.data(), bytes_.data(), position_);
-    return Crc32(std::span(words).first(position_ / 4));
-  }
+  /// Of all words but the last, which has the sum.
+  uint32_t Crc() const { return Crc32(std::span(words_).first(words_.size() - 1)); }
 
  private:
-  static constexpr size_t kMost = sizeof(LowState);
-  std::array<uint8_t, kMost> bytes_{};
-  size_t position_ = 0;
+  std::array<uint32_t, sizeof(T) / sizeof(uint32_t)> words_;
 };
 
 static_assert(std::endian::native == std::endian::little,
@@ -67,42 +57,24 @@ uint32_t Crc32(std::span<const uint32_t> words) {
 }
 
 uint32_t CrcOf(const LowCmd& command) {
-  Words words;
-  words.Add(command.mode_pr);
-  words.Add(command.mode_machine);
-  for (const MotorCmd& motor : command.motor_cmd) {
-    words.FillUp();
-    words.Add(motor.mode);
-    for (const float value : {motor.q, motor.dq, motor.tau, motor.kp, motor.kd}) words.Add(value);
-    words.Add(motor.reserve);
+  Words words(command);
+  words.Clear(offsetof(LowCmd, mode_machine) + 1, offsetof(LowCmd, motor_cmd));
+  for (size_t i = 0; i < kNumSlots; ++i) {
+    const size_t motor = offsetof(LowCmd, motor_cmd) + i * sizeof(MotorCmd);
+    words.Clear(motor + offsetof(MotorCmd, mode) + 1, motor + offsetof(MotorCmd, q));
   }
-  words.Add(command.reserve);
   return words.Crc();
 }
 
 uint32_t CrcOf(const LowState& state) {
-  Words words;
-  words.Add(state.version);
-  words.Add(state.mode_pr);
-  words.Add(state.mode_machine);
-  words.Add(state.tick);
-  words.Add(state.imu_state.quaternion);
-  words.Add(state.imu_state.gyroscope);
-  words.Add(state.imu_state.accelerometer);
-  words.Add(state.imu_state.rpy);
-  words.Add(state.imu_state.temperature);
-  for (const MotorState& motor : state.motor_state) {
-    words.FillUp();
-    words.Add(motor.mode);
-    for (const float value : {motor.q, motor.dq, motor.ddq, motor.tau_est}) words.Add(value);
-    words.Add(motor.temperature);
-    words.Add(motor.vol);
-    words.Add(motor.sensor);
-    words.Add(motor.motorstate);
-    words.Add(motor.reserve);
+  Words words(state);
+  words.Clear(offsetof(LowState, mode_machine) + 1, offsetof(LowState, tick));
+  const size_t imu = offsetof(LowState, imu_state);
+  words.Clear(imu + offsetof(ImuState, temperature) + sizeof(int16_t), imu + sizeof(ImuState));
+  for (size_t i = 0; i < kNumSlots; ++i) {
+    const size_t motor = offsetof(LowState, motor_state) + i * sizeof(MotorState);
+    words.Clear(motor + offsetof(MotorState, mode) + 1, motor + offsetof(MotorState, q));
   }
-  words.Add(state.wireless_remote);
-  words.Add(state.reserve);
   return words.Crc();
 }
 
