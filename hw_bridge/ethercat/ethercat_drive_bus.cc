@@ -280,12 +280,10 @@ void EthercatDriveBus::Idle(bool enable) {
   if (result.returned) health_.al_status = result.al_status;
   if (result.complete) TakeInputs();
   std::fill(idle_.enabled.begin(), idle_.enabled.end(), static_cast<int8_t>(enable ? 1 : 0));
-  SendOutputs(idle_);
+  Send(idle_);
 }
 
-void EthercatDriveBus::Send(const drive_command_t& command) { SendOutputs(command); }
-
-void EthercatDriveBus::SendOutputs(const drive_command_t& command) {
+void EthercatDriveBus::Send(const drive_command_t& command) {
   const bool sized =
       command.current.size() == drives_.size() && command.enabled.size() == drives_.size();
   bool any = false, all_enabled = true;

@@ -83,7 +83,6 @@ class EthercatDriveBus final : public DriveBus {
   /// Takes what has come of the last frame; the result of the exchange that has inputs.
   CycleResult ReceiveFrames();
   void TakeInputs();
-  void SendOutputs(const drive_command_t& command);
   int32_t Status(const Drive& drive, uint16_t statusword) const;
 
   LinkOpener open_link_;

@@ -119,48 +119,42 @@ void Master::CheckCount() {
         "emulator running, the address right?");
   }
   if (static_cast<size_t>(*found) == num_slaves()) return;
-  const auto missing = static_cast<int>(std::find(positions_.begin(), positions_.end(), *found) -
-                                        positions_.begin());
+  const auto missing = std::ranges::find(positions_, *found) - positions_.begin();
   throw EthercatError(
       "the EtherCAT bus has {} slaves, the configuration {} drives{} (the first without a slave: "
       "{}); check cables and power, or the list of drives",
       *found, num_drives(),
       config_.other_size() > 0 ? fmt::format(" and {} others", config_.other_size()) : "",
-      static_cast<size_t>(missing) < num_slaves() ? setup_.slave(static_cast<size_t>(missing)).name
-                                                  : "none");
+      missing < std::ssize(positions_) ? setup_.slave(static_cast<size_t>(missing)).name : "none");
 }
 
 void Master::ResetAndAddress() {
-  const auto broadcast = [this](uint16_t address, std::span<const uint8_t> data, bool all) {
+  // `value` and zeros, `size` bytes in all.
+  const auto broadcast = [this](uint16_t address, uint16_t value, size_t size, bool all) {
     std::array<uint8_t, kNumFmmus * kFmmuSize> bytes{};
-    std::copy(data.begin(), data.end(), bytes.begin());
+    Put<uint16_t>(bytes, 0, value);
     const auto counter =
-        transactions_.Execute(Command::kBwr, 0, address, std::span(bytes).first(data.size()));
+        transactions_.Execute(Command::kBwr, 0, address, std::span(bytes).first(size));
     if (!counter || (all && *counter != num_slaves())) {
       throw EthercatError("writing register 0x{:04X} reached {} of {} slaves", address,
                           counter.value_or(0), num_slaves());
     }
   };
-  constexpr std::array<uint8_t, kNumFmmus * kFmmuSize> kZeros{};
-  constexpr uint8_t kInit[] = {static_cast<uint8_t>(AlState::kInit) | kAlError, 0};
-  constexpr uint8_t kOne[] = {1}, kEvents[] = {kEventMask & 0xFF, kEventMask >> 8};
-  constexpr uint8_t kForce[] = {kEepromForce}, kMaster[] = {kEepromMaster};
-  const auto zeros = [&](size_t size) { return std::span(kZeros).first(size); };
   // A slave that has not yet taken an earlier request refuses this one; AwaitInit repeats it.
-  broadcast(reg::kAlControl, kInit, false);
+  broadcast(reg::kAlControl, static_cast<uint16_t>(AlState::kInit) | kAlError, 2, false);
   // What another master, or this one before it was killed, may have left. Not all slaves have all
   // of it.
-  broadcast(reg::kDcActivation, zeros(1), false);
-  broadcast(reg::kDlControl, kOne, true);
-  broadcast(reg::kLoopControl, zeros(1), true);
-  broadcast(reg::kAliasControl, zeros(1), true);
-  broadcast(reg::kEventMask, kEvents, false);
-  broadcast(reg::kReceiveErrors, zeros(8), false);
-  broadcast(reg::kLostLinks, zeros(4), false);
-  broadcast(reg::kFmmu, zeros(kNumFmmus * kFmmuSize), false);
-  broadcast(reg::kSyncManager, zeros(kNumSyncManagers * kSyncManagerSize), false);
-  broadcast(reg::kEepromConfig, kForce, true);
-  broadcast(reg::kEepromConfig, kMaster, true);
+  broadcast(reg::kDcActivation, 0, 1, false);
+  broadcast(reg::kDlControl, 1, 1, true);
+  broadcast(reg::kLoopControl, 0, 1, true);
+  broadcast(reg::kAliasControl, 0, 1, true);
+  broadcast(reg::kEventMask, kEventMask, 2, false);
+  broadcast(reg::kReceiveErrors, 0, 8, false);
+  broadcast(reg::kLostLinks, 0, 4, false);
+  broadcast(reg::kFmmu, 0, kNumFmmus * kFmmuSize, false);
+  broadcast(reg::kSyncManager, 0, kNumSyncManagers * kSyncManagerSize, false);
+  broadcast(reg::kEepromConfig, kEepromForce, 1, true);
+  broadcast(reg::kEepromConfig, kEepromMaster, 1, true);
   for (SlaveAccess& slave : slaves_) {
     if (!slave.AssignStation())
       slave.Fail("does not take its station address; is the chain whole?");
@@ -197,8 +191,7 @@ void Master::FindPositions() {
   }
   const auto read = [this](SlaveAccess& slave, std::string_view what) -> std::optional<uint32_t> {
     if (what == "station alias") return slave.Read<uint16_t>(reg::kStationAlias);
-    const std::optional<uint16_t> found = slave.ReadIdentification();
-    return found ? std::optional<uint32_t>(*found) : std::nullopt;
+    return slave.ReadIdentification();
   };
   if (!all) {
     for (size_t i = 0; i < num_slaves(); ++i) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "hw_bridge/ethercat/links/bytes.h"
 #include "hw_bridge/ethercat/links/frame.h"
@@ -11,25 +12,14 @@ namespace poise::ethercat {
 namespace {
 
 /// Bits of the objects that the bridge knows, by CiA 402; 0: any.
-int StandardBits(uint16_t index) {
-  switch (index) {
-    case object::kModeOfOperation:
-    case object::kModeDisplay:
-      return 8;
-    case object::kControlword:
-    case object::kStatusword:
-    case object::kTargetTorque:
-    case object::kMaxTorque:
-    case object::kTorque:
-      return 16;
-    case object::kPosition:
-    case object::kVelocity:
-    case object::kTargetPosition:
-    case object::kTargetVelocity:
-      return 32;
-    default:
-      return 0;
-  }
+uint32_t StandardBits(uint16_t index) {
+  constexpr std::pair<uint16_t, uint32_t> kBits[] = {
+      {object::kModeOfOperation, 8}, {object::kModeDisplay, 8},    {object::kControlword, 16},
+      {object::kStatusword, 16},     {object::kTargetTorque, 16},  {object::kMaxTorque, 16},
+      {object::kTorque, 16},         {object::kPosition, 32},      {object::kVelocity, 32},
+      {object::kTargetPosition, 32}, {object::kTargetVelocity, 32}};
+  const auto* const found = std::ranges::find(kBits, index, &std::pair<uint16_t, uint32_t>::first);
+  return found != std::end(kBits) ? found->second : 0;
 }
 
 void Require(std::initializer_list<uint16_t> needed, std::string_view pdo, const auto& direction,
@@ -62,9 +52,9 @@ ProcessImage::Direction ProcessImage::MakeDirection(const DriveProfile& profile,
                           profile.name(), rx ? "rx" : "tx", pdo, base, base + 0x1FF);
     }
     const auto index = static_cast<uint16_t>(object.index());
-    const int standard = StandardBits(index);
+    const uint32_t standard = StandardBits(index);
     const bool aligned = standard == 0 || direction.bits % 8 == 0;
-    if (!aligned || (standard != 0 && static_cast<int>(object.bits()) != standard)) {
+    if (!aligned || (standard != 0 && object.bits() != standard)) {
       throw EthercatError(
           "drive profile \"{}\": object {:04X}:{:02X} of {} bits cannot be mapped{}",
           profile.name(), object.index(), object.subindex(), object.bits(),

@@ -244,7 +244,7 @@ void SlaveAccess::AwaitInit() {
   }
 }
 
-std::optional<uint16_t> SlaveAccess::ReadIdentification() {
+std::optional<uint32_t> SlaveAccess::ReadIdentification() {
   const AlStatus before = ReadAlStatus();
   const auto control = static_cast<uint8_t>(before.state);
   const int64_t deadline = Now() + timeouts_.eeprom;
@@ -252,7 +252,7 @@ std::optional<uint16_t> SlaveAccess::ReadIdentification() {
     if (Now() > deadline) Fail("does not take the request for its identification");
     Pause();
   }
-  std::optional<uint16_t> found;
+  std::optional<uint32_t> found;
   while (!found && Now() < deadline) {
     std::array<uint8_t, 6> bytes{};
     Read(reg::kAlStatus, bytes);

@@ -102,7 +102,7 @@ class SlaveAccess {
   std::array<SyncManagerEntry, kNumSyncManagers> ReadSyncManagers();
   /// The number that the slave gives when it is asked for its identification (ETG.1020: AL control
   /// bit 5, answered in the AL status code); nullopt: it has none. In INIT or PRE-OP.
-  std::optional<uint16_t> ReadIdentification();
+  std::optional<uint32_t> ReadIdentification();
 
   struct AlStatus {
     AlState state = AlState::kInit;

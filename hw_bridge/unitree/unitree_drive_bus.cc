@@ -186,7 +186,7 @@ void UnitreeDriveBus::TakeImu() {
   std::copy(std::begin(imu.quaternion), std::end(imu.quaternion), feedback_.imu_orientation);
 }
 
-bool UnitreeDriveBus::TakeState() {
+void UnitreeDriveBus::TakeState() {
   TakeMotors();
   TakeImu();
   if ((Buttons(state_.wireless_remote) & stop_buttons_) != 0) {
@@ -196,7 +196,6 @@ bool UnitreeDriveBus::TakeState() {
   } else {
     health_.stop = bridge_status_t::REASON_NONE;
   }
-  return true;
 }
 
 const drive_feedback_t* UnitreeDriveBus::Receive() {

@@ -58,7 +58,7 @@ class UnitreeDriveBus final : public DriveBus {
   /// Takes the newest state that has come, whole and newer than the last; waits for one until
   /// `deadline`. In simulated time, `in_run`, one of the run's cycles.
   bool ReceiveState(int64_t deadline, bool in_run = false);
-  bool TakeState();
+  void TakeState();
   void TakeMotors();
   void TakeImu();
   void SendMotors(const drive_command_t* command, bool enable = false);

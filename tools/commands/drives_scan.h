@@ -14,7 +14,7 @@ struct ScannedSlave {
   ethercat::Identity identity;
   std::string name;    ///< object 1008; empty: it gives none
   uint16_t alias = 0;  ///< station alias; 0: none
-  std::optional<uint16_t> identification;
+  std::optional<uint32_t> identification;
   bool is_drive = false;  ///< of CiA 402, with cyclic synchronous torque
   int parent = -1, parent_port = -1;
   std::vector<uint32_t> rx, tx;                         ///< mapping entries as in 16xx and 1Axx

@@ -11,9 +11,9 @@ void SlotLink::Set(State state) {
   state_.notify_all();
 }
 
-int SlotLink::AwaitChange(State a, State b) {
+int SlotLink::AwaitChange(std::initializer_list<State> from) {
   int state = state_.load(std::memory_order_acquire);
-  while (state == a || state == b) {
+  while (std::ranges::find(from, state) != from.end()) {
     state_.wait(state, std::memory_order_acquire);
     state = state_.load(std::memory_order_acquire);
   }
@@ -39,7 +39,7 @@ bool SlotLink::Send(std::span<const uint8_t> frame) {
 
 size_t SlotLink::Receive(std::span<uint8_t> frame, int64_t deadline) {
   if (sent_) {
-    const int state = AwaitChange(kPosted, kUnderWay);
+    const int state = AwaitChange({kPosted, kUnderWay});
     sent_ = false;
     const size_t size = state == kAnswered ? std::min(size_, frame.size()) : 0;
     std::copy_n(frame_.begin(), size, frame.begin());
@@ -49,7 +49,7 @@ size_t SlotLink::Receive(std::span<uint8_t> frame, int64_t deadline) {
   if (closed() || deadline <= now_.load(std::memory_order_acquire)) return 0;
   wake_.store(deadline, std::memory_order_release);
   Set(kSleeping);
-  static_cast<void>(AwaitChange(kSleeping, kSleeping));
+  static_cast<void>(AwaitChange({kSleeping}));
   Set(kRunning);
   return 0;
 }
@@ -86,11 +86,7 @@ void SlotLink::Advance(int64_t now) {
 
 void SlotLink::Settle() {
   // What was answered or lost has still to be looked at.
-  int state = state_.load(std::memory_order_acquire);
-  while (state == kRunning || state == kAnswered || state == kLost) {
-    state_.wait(state, std::memory_order_acquire);
-    state = state_.load(std::memory_order_acquire);
-  }
+  static_cast<void>(AwaitChange({kRunning, kAnswered, kLost}));
 }
 
 void SlotLink::Close() {

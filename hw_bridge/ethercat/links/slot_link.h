@@ -3,6 +3,7 @@
 
 #include <array>
 #include <atomic>
+#include <initializer_list>
 #include <optional>
 
 #include "hw_bridge/ethercat/links/frame.h"
@@ -41,8 +42,8 @@ class SlotLink final : public Link {
  private:
   enum State : int { kRunning, kPosted, kUnderWay, kAnswered, kLost, kSleeping, kFinished };
   void Set(State state);
-  /// Waits while the state is one of two; the state after that.
-  int AwaitChange(State a, State b);
+  /// Waits while the state is one of these; the state after that.
+  int AwaitChange(std::initializer_list<State> from);
 
   std::atomic<int> state_{kRunning};
   std::atomic<int64_t> now_{0}, wake_{0};
