@@ -189,22 +189,29 @@ std::optional<bool> Violated(const RunRecord& run, int64_t tick) {
   return false;
 }
 
+Eigen::MatrixXd FromTriangle(const double* triangle, int size) {
+  Eigen::MatrixXd matrix(size, size);
+  for (int row = 0; row < size; ++row) {
+    for (int column = row; column < size; ++column) {
+      matrix(row, column) = matrix(column, row) = *triangle++;
+    }
+  }
+  return matrix;
+}
+
+Answer NormalisedSquare(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance) {
+  const Eigen::LLT<Eigen::MatrixXd> factors(covariance);
+  if (factors.info() != Eigen::Success) return {};
+  return error.dot(factors.solve(error));
+}
+
 Answer Nees(const robot_state_t& estimate, const estimator_status_t& status,
             const ground_truth_t& truth, NeesPart part) {
   if (status.has_covariance == 0) return {};
-  Eigen::Matrix<double, 9, 9> covariance;
-  size_t next = 0;
-  for (int row = 0; row < 9; ++row) {
-    for (int column = row; column < 9; ++column) {
-      covariance(row, column) = covariance(column, row) = status.covariance[next++];
-    }
-  }
   const std::vector<int> rows = part == NeesPart::kAll ? std::vector<int>{0, 1, 2, 3, 4, 5, 6, 7, 8}
                                                        : std::vector<int>{0, 1, 3, 4, 5};
-  const Eigen::VectorXd e = BaseErrorVector(estimate, truth)(rows);
-  const Eigen::LLT<Eigen::MatrixXd> factors(covariance(rows, rows));
-  if (factors.info() != Eigen::Success) return {};
-  return e.dot(factors.solve(e));
+  return NormalisedSquare(BaseErrorVector(estimate, truth)(rows),
+                          FromTriangle(status.covariance, 9)(rows, rows));
 }
 
 double NeesBound(NeesPart part) { return part == NeesPart::kAll ? 16.918978 : 11.070498; }

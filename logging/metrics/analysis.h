@@ -87,6 +87,11 @@ balance::ConvexPolygon AcceptableRegion(const balance_torque_t& balance);
 /// there is BALANCE_TORQUE. Empty where the command tells of no foot.
 std::optional<bool> Violated(const RunRecord& run, int64_t tick);
 
+/// Returns the symmetric matrix of `size` rows whose upper triangle stands in `triangle` by rows.
+Eigen::MatrixXd FromTriangle(const double* triangle, int size);
+/// Returns eᵀ P⁻¹ e; nothing where P is not positive definite.
+Answer NormalisedSquare(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance);
+
 /// Which errors a normalised estimation error squared (NEES) counts.
 enum class NeesPart {
   kAll,         ///< 9 degrees of freedom

@@ -65,47 +65,41 @@ Answer TorqueStep(const RunRecord& run) {
   return smallest;
 }
 
-/// A counter of the bridge at the end of the run.
-Metric BusCounter(const char* name, const char* description, int64_t bridge_status_t::*counter) {
-  return {name, "", description, [counter](const RunRecord& run) -> Answer {
-            for (int64_t tick = run.num_ticks - 1; tick >= run.first_tick; --tick) {
-              if (const bridge_status_t* bridge = run.bridge.at(tick)) {
-                return static_cast<double>(bridge->*counter);
-              }
-            }
-            return {};
-          }};
-}
-
 }  // namespace
 
 void AddDrives(MetricList* list) {
-  list->push_back({"drive_torque_step", "N·m",
-                   "smallest change of a joint's torque that the drives have made", TorqueStep});
-  list->push_back({"drive_torque_error", "N·m",
-                   "largest difference between a joint's torque as the bridge ordered it and as "
-                   "the drives gave it, at the delay between them",
-                   [](const RunRecord& run) -> Answer {
-                     const int delay = BestDelay(run);
-                     if (delay < 0) return {};
-                     return DeviationAt(run, delay).largest;
-                   }});
-  list->push_back({"drive_delay", "ticks",
-                   "delay from the bridge's torque to the drives', at which they agree best",
-                   [](const RunRecord& run) -> Answer {
-                     const int delay = BestDelay(run);
-                     if (delay < 0) return {};
-                     return delay;
-                   }});
-  list->push_back(BusCounter("bus_frames_sent", "EtherCAT frames that the bridge has sent",
-                             &bridge_status_t::frames_sent));
-  list->push_back(BusCounter("bus_frames_lost", "EtherCAT frames that have not come back in time",
-                             &bridge_status_t::frames_lost));
-  list->push_back(BusCounter("bus_working_counter_errors",
-                             "EtherCAT frames that not all drives have answered",
-                             &bridge_status_t::working_counter_errors));
-  list->push_back(BusCounter("bridge_overruns", "cycles of the bridge that began too late",
-                             &bridge_status_t::overruns));
+  list->Add("drive_torque_step", "N·m",
+            "smallest change of a joint's torque that the drives have made", TorqueStep);
+  list->Add("drive_torque_error", "N·m",
+            "largest difference between a joint's torque as the bridge ordered it and as the "
+            "drives gave it, at the delay between them",
+            [](const RunRecord& run) -> Answer {
+              const int delay = BestDelay(run);
+              if (delay < 0) return {};
+              return DeviationAt(run, delay).largest;
+            });
+  list->Add("drive_delay", "ticks",
+            "delay from the bridge's torque to the drives', at which they agree best",
+            [](const RunRecord& run) {
+              const int delay = BestDelay(run);
+              return delay < 0 ? Answer() : delay;
+            });
+  // A counter of the bridge at the end of the run.
+  const auto add = [&](const char* name, const char* text, int64_t bridge_status_t::*counter) {
+    list->Add(name, "", text, [counter](const RunRecord& run) -> Answer {
+      for (int64_t tick = run.num_ticks - 1; tick >= run.first_tick; --tick) {
+        const bridge_status_t* const bridge = run.bridge.at(tick);
+        if (bridge != nullptr) return static_cast<double>(bridge->*counter);
+      }
+      return {};
+    });
+  };
+  add("bus_frames_sent", "EtherCAT frames that the bridge has sent", &bridge_status_t::frames_sent);
+  add("bus_frames_lost", "EtherCAT frames that have not come back in time",
+      &bridge_status_t::frames_lost);
+  add("bus_working_counter_errors", "EtherCAT frames that not all drives have answered",
+      &bridge_status_t::working_counter_errors);
+  add("bridge_overruns", "cycles of the bridge that began too late", &bridge_status_t::overruns);
 }
 
 }  // namespace poise::logging

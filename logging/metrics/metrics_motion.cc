@@ -1,4 +1,6 @@
 #include <cmath>
+#include <optional>
+#include <string>
 
 #include "components/messages/conversions.h"
 #include "components/robot/dynamics.h"
@@ -9,155 +11,136 @@
 namespace poise::logging {
 namespace {
 
-Answer Absolute(Answer value) {
-  if (value) *value = std::abs(*value);
-  return value;
+/// m, size of the distance along an axis of the COM that a message tells of from its reference.
+auto ComErrorOf(auto series, int axis) {
+  return Of(&RunRecord::plan, series, [axis](const auto& plan, const auto& message) {
+    Answer error = ComError(plan, message.com_position, axis);
+    if (error) *error = std::abs(*error);
+    return error;
+  });
 }
 
-/// mm, largest distance of the COM that `series` tells of from its reference.
-template <class T>
-Answer LargestComError(const RunRecord& run, const Series<T>& series, int axis) {
-  const auto error =
-      OfTick(run.plan, series, [axis](const support_plan_t& plan, const T& message) -> Answer {
-        return Absolute(ComError(plan, message.com_position, axis));
-      });
-  return Scaled(Maximum(run, error), kMilli);
-}
-
-Answer ComMotion(const RunRecord& run) {
-  std::optional<Eigen::Vector3d> start;
-  const auto motion = OfTick(run.truth, [&](const ground_truth_t& truth) {
-    const Eigen::Vector3d com = GetVector3(truth.com_position);
+/// m, from where the COM was in the first tick that is looked at.
+auto ComMotion(const RunRecord& run) {
+  return [&run, start = std::optional<Eigen::Vector3d>()](int64_t t) mutable -> Answer {
+    const ground_truth_t* const truth = run.truth.at(t);
+    if (truth == nullptr) return {};
+    const Eigen::Vector3d com = GetVector3(truth->com_position);
     if (!start) start = com;
     return (com - *start).norm();
-  });
-  return Scaled(Maximum(run, motion), kMilli);
+  };
 }
 
-Answer ComDifference(const RunRecord& run) {
+/// m.
+Answer ComDifference(const RunRecord& run, int64_t t) {
   if (!run.reference) return {};
-  return Scaled(
-      Maximum(run,
-              [&](int64_t t) -> Answer {
-                const ground_truth_t* here = run.truth.at(t);
-                const ground_truth_t* there =
-                    run.reference->truth.at(run.reference->TickOf(run, t));
-                if (here == nullptr || there == nullptr) return {};
-                return (GetVector3(here->com_position) - GetVector3(there->com_position)).norm();
-              }),
-      kMilli);
+  const ground_truth_t* here = run.truth.at(t);
+  const ground_truth_t* there = run.reference->truth.at(run.reference->TickOf(run, t));
+  if (here == nullptr || there == nullptr) return {};
+  return (GetVector3(here->com_position) - GetVector3(there->com_position)).norm();
 }
 
-Answer ModelComErrorAtEnd(const RunRecord& run) {
-  const support_plan_t* plan = run.plan.at(run.num_ticks - 1);
-  const ground_truth_t* truth = run.truth.at(run.num_ticks - 1);
-  if (plan == nullptr || truth == nullptr || !HasComReference(*plan, 0)) return {};
+/// m, of what `com` gives from its reference at the run's end.
+template <class F>
+Compute ComErrorAtEnd(const F& com) {
+  return [com](const RunRecord& run) -> Answer {
+    const support_plan_t* plan = run.plan.at(run.num_ticks - 1);
+    const ground_truth_t* truth = run.truth.at(run.num_ticks - 1);
+    if (plan == nullptr || truth == nullptr || !HasComReference(*plan, 0)) return {};
+    return kMilli * (com(run, *truth) - GetVector3(plan->com_reference.position)).norm();
+  };
+}
+
+/// m, of the controller's model in the true posture.
+Eigen::Vector3d ModelCom(const RunRecord& run, const ground_truth_t& truth) {
   robot::RobotState state(run.robot.num_joints());
-  state.base_position = GetVector3(truth->base_position);
-  const double* q = truth->base_orientation;
+  state.base_position = GetVector3(truth.base_position);
+  const double* q = truth.base_orientation;
   state.base_orientation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
   for (int j = 0; j < run.robot.num_joints(); ++j) {
-    state.joint_position[j] = truth->joint_position[static_cast<size_t>(j)];
+    state.joint_position[j] = truth.joint_position[static_cast<size_t>(j)];
   }
   robot::RobotData data(run.robot);
   robot::ComputeKinematics(run.robot, state, &data);
   robot::ComputeDynamics(run.robot, state, &data);
-  return kMilli * (data.com - GetVector3(plan->com_reference.position)).norm();
+  return data.com;
 }
 
 /// Largest error of the body's orientation about x in the first or last time on both feet.
-Answer BodyRotationOnBothFeet(const RunRecord& run, bool first) {
-  const auto both = [&](int64_t t) -> std::optional<bool> {
-    if (t < run.first_tick) return false;
-    const support_plan_t* plan = run.plan.at(t);
-    if (plan == nullptr) return {};
-    return plan->in_contact[0] != 0 && plan->in_contact[1] != 0;
+Compute BodyRotationOnBothFeet(bool first) {
+  return [first](const RunRecord& run) -> Answer {
+    const auto both = [&](int64_t t) -> std::optional<bool> {
+      if (t < run.first_tick) return false;
+      const support_plan_t* plan = run.plan.at(t);
+      if (plan == nullptr) return {};
+      return plan->in_contact[0] != 0 && plan->in_contact[1] != 0;
+    };
+    const std::vector<Interval> intervals = Intervals(run, both);
+    if (intervals.empty() || (!first && intervals.size() < 2)) return {};
+    const Interval& interval = first ? intervals.front() : intervals.back();
+    const auto error = [&](int64_t t) -> Answer {
+      const task_torque_t* task = run.task.at(t);
+      const bool within = t >= interval.begin && t < interval.end.value_or(run.num_ticks);
+      if (task == nullptr || !within) return {};
+      return std::abs(task->body_orientation_error[0]);
+    };
+    return Scaled(Maximum(run, error), kMilli);
   };
-  const std::vector<Interval> intervals = Intervals(run, both);
-  if (intervals.empty() || (!first && intervals.size() < 2)) return {};
-  const Interval& interval = first ? intervals.front() : intervals.back();
-  return Scaled(Maximum(run,
-                        [&](int64_t t) -> Answer {
-                          const task_torque_t* task = run.task.at(t);
-                          if (task == nullptr || t < interval.begin ||
-                              t >= interval.end.value_or(run.num_ticks)) {
-                            return {};
-                          }
-                          return std::abs(task->body_orientation_error[0]);
-                        }),
-                kMilli);
 }
 
 }  // namespace
 
 void AddMotion(MetricList* list) {
   for (int axis = 0; axis < 3; ++axis) {
-    list->push_back(
-        {fmt::format("com_error_max_{}", kAxis[axis]), "mm",
-         fmt::format("largest distance of the estimated COM from its reference, {}", kAxis[axis]),
-         [axis](const RunRecord& run) { return LargestComError(run, run.planner, axis); }});
+    list->Add(
+        fmt::format("com_error_max_{}", kAxis[axis]), "mm",
+        fmt::format("largest distance of the estimated COM from its reference, {}", kAxis[axis]),
+        Largest(ComErrorOf(&RunRecord::planner, axis), kMilli));
   }
   for (int axis = 0; axis < 3; ++axis) {
-    list->push_back(
-        {fmt::format("com_error_true_max_{}", kAxis[axis]), "mm",
-         fmt::format("largest distance of the true COM from its reference, {}", kAxis[axis]),
-         [axis](const RunRecord& run) { return LargestComError(run, run.truth, axis); }});
+    list->Add(fmt::format("com_error_true_max_{}", kAxis[axis]), "mm",
+              fmt::format("largest distance of the true COM from its reference, {}", kAxis[axis]),
+              Largest(ComErrorOf(&RunRecord::truth, axis), kMilli));
   }
-  list->push_back(
-      {"com_error_end", "mm", "distance of the true COM from its reference at the end",
-       [](const RunRecord& run) -> Answer {
-         const support_plan_t* plan = run.plan.at(run.num_ticks - 1);
-         const ground_truth_t* truth = run.truth.at(run.num_ticks - 1);
-         if (plan == nullptr || truth == nullptr || !HasComReference(*plan, 0)) return {};
-         return kMilli *
-                (GetVector3(truth->com_position) - GetVector3(plan->com_reference.position)).norm();
-       }});
-  list->push_back({"com_error_end_model", "mm",
-                   "the same of the COM that the controller's model has in the true posture: "
-                   "without the model's "
-                   "own error",
-                   ModelComErrorAtEnd});
-  list->push_back({"orientation_error_max", "mrad", "largest error of the body's orientation",
-                   [](const RunRecord& run) {
-                     const auto error = OfTick(run.task, [](const task_torque_t& task) {
-                       return GetVector3(task.body_orientation_error).norm();
-                     });
-                     return Scaled(Maximum(run, error), kMilli);
-                   }});
-  list->push_back({"com_motion_max", "mm",
-                   "largest distance of the true COM from where it was when the window began",
-                   ComMotion});
-  list->push_back({"com_motion_reference_max", "mm",
-                   "largest distance of the true COM from where it was when the window began, "
-                   "reference run",
-                   [](const RunRecord& run) { return OfReference(run, ComMotion); }});
-  list->push_back({"com_difference_max", "mm",
-                   "largest distance of the true COM from the reference run's at the same tick",
-                   ComDifference});
-  list->push_back({"body_rotation_x_max_first_double", "mrad",
-                   "largest body orientation error about x, first time on both feet",
-                   [](const RunRecord& run) { return BodyRotationOnBothFeet(run, true); }});
-  list->push_back({"body_rotation_x_max_last_double", "mrad",
-                   "largest body orientation error about x, last time on both feet (of several)",
-                   [](const RunRecord& run) { return BodyRotationOnBothFeet(run, false); }});
-  for (int foot = 0; foot < 2; ++foot) {
+  list->Add("com_error_end", "mm", "distance of the true COM from its reference at the end",
+            ComErrorAtEnd([](const RunRecord&, const ground_truth_t& truth) {
+              return GetVector3(truth.com_position);
+            }));
+  list->Add("com_error_end_model", "mm",
+            "the same of the COM that the controller's model has in the true posture: without the "
+            "model's own error",
+            ComErrorAtEnd(ModelCom));
+  list->Add(
+      "orientation_error_max", "mrad", "largest error of the body's orientation",
+      Largest(Of(&RunRecord::task,
+                 [](const auto& task) { return GetVector3(task.body_orientation_error).norm(); }),
+              kMilli));
+  const std::string motion =
+      "largest distance of the true COM from where it was when the window began";
+  list->Add("com_motion_max", "mm", motion, Largest(ComMotion, kMilli));
+  list->Add("com_motion_reference_max", "mm", motion + ", reference run",
+            OfReference(Largest(ComMotion, kMilli)));
+  list->Add("com_difference_max", "mm",
+            "largest distance of the true COM from the reference run's at the same tick",
+            Largest(ComDifference, kMilli));
+  list->Add("body_rotation_x_max_first_double", "mrad",
+            "largest body orientation error about x, first time on both feet",
+            BodyRotationOnBothFeet(true));
+  list->Add("body_rotation_x_max_last_double", "mrad",
+            "largest body orientation error about x, last time on both feet (of several)",
+            BodyRotationOnBothFeet(false));
+  for (size_t foot = 0; foot < 2; ++foot) {
     for (int axis = 0; axis < 3; ++axis) {
-      list->push_back(
-          {fmt::format("{}_foot_error_max_{}", kFoot[foot], kAxis[axis]), "mm",
-           fmt::format("largest distance of the {} foot from its reference while off the ground, "
-                       "{}",
-                       kFoot[foot], kAxis[axis]),
-           [foot, axis](const RunRecord& run) {
-             const auto error =
-                 OfTick(run.plan, run.planner,
-                        [=](const support_plan_t& plan, const planner_status_t& planner) -> Answer {
-                          const auto f = static_cast<size_t>(foot);
-                          if (plan.in_contact[f] != 0) return {};
-                          return std::abs(planner.foot_pose[f].position[axis] -
-                                          plan.foot_reference[f].position[axis]);
-                        });
-             return Scaled(Maximum(run, error), kMilli);
-           }});
+      const auto error = [foot, axis](const auto& plan, const auto& planner) -> Answer {
+        if (plan.in_contact[foot] != 0) return {};
+        return std::abs(planner.foot_pose[foot].position[axis] -
+                        plan.foot_reference[foot].position[axis]);
+      };
+      list->Add(fmt::format("{}_foot_error_max_{}", kFoot[foot], kAxis[axis]), "mm",
+                fmt::format("largest distance of the {} foot from its reference while off the "
+                            "ground, {}",
+                            kFoot[foot], kAxis[axis]),
+                Largest(Of(&RunRecord::plan, &RunRecord::planner, error), kMilli));
     }
   }
 }

@@ -1,4 +1,4 @@
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 
 #include "components/messages/conversions.h"
@@ -34,51 +34,32 @@ std::optional<Compared> WrenchesAt(const RunRecord& run, size_t foot, int64_t ti
   return Compared{GetWrench(status->observed_wrench[foot]), GetWrench(truth->foot_wrench[foot])};
 }
 
-/// Largest over both feet of what `value` gives.
-std::function<Answer(const RunRecord&, int64_t)> OfFeet(
-    std::function<Answer(const RunRecord&, const Compared&)> value) {
-  return [value](const RunRecord& run, int64_t tick) {
+/// RMS and maximum of the larger of both feet's `value`.
+template <class Value>
+void AddObserverErrors(MetricList* list, const char* name, const char* unit, const char* text,
+                       const Value& value) {
+  const auto worse = [value](const RunRecord& run, int64_t tick) {
     Answer result;
     for (size_t foot = 0; foot < 2; ++foot) {
       const auto compared = WrenchesAt(run, foot, tick);
-      if (!compared) continue;
-      const Answer v = value(run, *compared);
-      if (v) result = std::max(result.value_or(0), *v);
+      if (compared) result = std::max(result, Answer(value(run, *compared)));
     }
     return result;
   };
+  const std::string what = fmt::format("observed less true {}, of the worse foot, ", text);
+  list->Add(fmt::format("observer_{}_rms", name), unit, what + "RMS", Rms(worse));
+  list->Add(fmt::format("observer_{}_max", name), unit, what + "largest", Largest(worse));
 }
 
-void AddObserverErrors(MetricList* list, const char* name, const char* unit, const char* text,
-                       const std::function<Answer(const RunRecord&, int64_t)>& value) {
-  list->push_back({fmt::format("observer_{}_rms", name), unit,
-                   fmt::format("observed less true {}, of the worse foot, RMS", text),
-                   [value](const RunRecord& run) {
-                     return RootMeanSquare(run, [&](int64_t t) { return value(run, t); });
-                   }});
-  list->push_back({fmt::format("observer_{}_max", name), unit,
-                   fmt::format("observed less true {}, of the worse foot, largest", text),
-                   [value](const RunRecord& run) {
-                     return Maximum(run, [&](int64_t t) { return value(run, t); });
-                   }});
-}
-
-Answer ObserverNees(const RunRecord& run, int64_t tick) {
+/// Whether the normalised squared error of both wrenches is within the bound.
+std::optional<bool> WithinBound(const RunRecord& run, int64_t tick) {
   const auto right = WrenchesAt(run, 0, tick), left = WrenchesAt(run, 1, tick);
   if (!right || !left) return {};
-  const estimator_status_t& status = *run.estimator.at(tick);
-  Eigen::Matrix<double, 12, 12> covariance;
-  size_t next = 0;
-  for (int row = 0; row < 12; ++row) {
-    for (int column = row; column < 12; ++column) {
-      covariance(row, column) = covariance(column, row) = status.observed_covariance[next++];
-    }
-  }
-  Eigen::Matrix<double, 12, 1> error;
+  Eigen::VectorXd error(12);
   error << right->observed - right->truth, left->observed - left->truth;
-  const Eigen::LLT<Eigen::Matrix<double, 12, 12>> factors(covariance);
-  if (factors.info() != Eigen::Success) return {};
-  return error.dot(factors.solve(error));
+  const Answer nees =
+      NormalisedSquare(error, FromTriangle(run.estimator.at(tick)->observed_covariance, 12));
+  return nees ? std::optional(*nees < kWrenchNeesBound) : std::nullopt;
 }
 
 /// The tick at which the foot's true load, that of `tick`, has been above TrueTouchLoad for
@@ -108,74 +89,85 @@ bool TouchedNothing(const RunRecord& run, size_t foot, int64_t tick) {
 // s: what the calibration is asked for at, and how long its figures are averaged.
 constexpr double kCalibrated = 2, kAveraged = 0.2;
 
-/// Mean of what `value` gives in the kAveraged before `time`, s; empty when the run is shorter.
-Answer MeanBefore(const RunRecord& run, double time, const std::function<Answer(int64_t)>& value) {
-  double sum = 0;
-  int64_t count = 0;
-  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
-    if (run.time(tick) > time || run.time(tick) < time - kAveraged) continue;
-    if (const Answer v = value(tick)) {
-      sum += *v;
-      ++count;
+/// Mean of what `signal` tells in the kAveraged before the run's end, or before kCalibrated; empty
+/// when the run is shorter.
+template <class Signal>
+Compute MeanBefore(bool end, Signal signal) {
+  return [=](const RunRecord& run) -> Answer {
+    const double time = end ? run.time(run.num_ticks) : kCalibrated;
+    const auto value = ByTick(signal, run);
+    double sum = 0;
+    int64_t count = 0;
+    for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
+      if (run.time(tick) > time || run.time(tick) < time - kAveraged) continue;
+      if (const Answer v = value(tick)) {
+        sum += *v;
+        ++count;
+      }
     }
+    if (count == 0 || run.time(run.num_ticks) < time) return {};
+    return sum / static_cast<double>(count);
+  };
+}
+
+/// %, of what the ground carries.
+Answer MassError(const RunRecord& run, int64_t tick) {
+  const robot_state_t* state = run.state.at(tick);
+  const ground_truth_t* truth = run.truth.at(tick);
+  // A controller that tells no task need not believe in the model's mass.
+  if (state == nullptr || truth == nullptr || run.task.empty()) return {};
+  double force = 0;
+  for (size_t f = 0; f < 2; ++f) {
+    force += (GetPose(truth->foot_pose[f]).linear() * GetVector3(truth->foot_wrench[f].force)).z();
   }
-  if (count == 0 || run.time(run.num_ticks) < time) return {};
-  return sum / static_cast<double>(count);
+  const double carried = -force / robot::kGravity;
+  return 100 * (run.robot.total_mass() + state->load_mass - carried) / carried;
 }
 
 void AddCalibration(MetricList* list) {
-  const auto mass = [](const RunRecord& run, int64_t tick) -> Answer {
-    const robot_state_t* state = run.state.at(tick);
-    const ground_truth_t* truth = run.truth.at(tick);
-    // A controller that tells no task need not believe in the model's mass.
-    if (state == nullptr || truth == nullptr || run.task.empty()) return {};
-    double force = 0;
-    for (size_t f = 0; f < 2; ++f) {
-      force +=
-          (GetPose(truth->foot_pose[f]).linear() * GetVector3(truth->foot_wrench[f].force)).z();
-    }
-    const double carried = -force / robot::kGravity;
-    return 100 * (run.robot.total_mass() + state->load_mass - carried) / carried;
-  };
-  const auto com = [](const RunRecord& run, int64_t tick, int axis) -> Answer {
-    const planner_status_t* planner = run.planner.at(tick);
-    const ground_truth_t* truth = run.truth.at(tick);
-    if (planner == nullptr || truth == nullptr) return {};
-    return kMilli * (planner->com_position[axis] - truth->com_position[axis]);
-  };
-  const auto tilt = [](const RunRecord& run, int64_t tick, int axis) -> Answer {
-    const estimator_status_t* status = run.estimator.at(tick);
-    if (status == nullptr || status->calibration == estimator_status_t::CALIBRATION_OFF) return {};
-    return kMilli * status->imu_tilt[axis];
-  };
   for (const bool end : {false, true}) {
     const std::string when = end ? "end" : "2s";
     const std::string text = end ? "at the end" : "after 2 s";
-    const auto time = [end](const RunRecord& run) {
-      return end ? run.time(run.num_ticks) : kCalibrated;
-    };
-    list->push_back({"mass_error_" + when, "%",
-                     "mass that the controller believes in less what the ground carries, " + text,
-                     [=](const RunRecord& run) {
-                       return MeanBefore(run, time(run), [&](int64_t t) { return mass(run, t); });
-                     }});
+    list->Add("mass_error_" + when, "%",
+              "mass that the controller believes in less what the ground carries, " + text,
+              MeanBefore(end, MassError));
     for (int axis = 0; axis < 3; ++axis) {
-      list->push_back({fmt::format("com_estimate_error_{}_{}", kAxis[axis], when), "mm",
-                       fmt::format("estimated less true COM, {}, {}", kAxis[axis], text),
-                       [=](const RunRecord& run) {
-                         return MeanBefore(run, time(run),
-                                           [&](int64_t t) { return com(run, t, axis); });
-                       }});
+      const auto error = [axis](const auto& planner, const auto& truth) {
+        return kMilli * (planner.com_position[axis] - truth.com_position[axis]);
+      };
+      list->Add(fmt::format("com_estimate_error_{}_{}", kAxis[axis], when), "mm",
+                fmt::format("estimated less true COM, {}, {}", kAxis[axis], text),
+                MeanBefore(end, Of(&RunRecord::planner, &RunRecord::truth, error)));
     }
     for (int axis = 0; axis < 2; ++axis) {
-      list->push_back({fmt::format("imu_tilt_{}_{}", kAxis[axis], when), "mrad",
-                       fmt::format("tilt of the IMU about its {}, as found, {}", kAxis[axis], text),
-                       [=](const RunRecord& run) {
-                         return MeanBefore(run, time(run),
-                                           [&](int64_t t) { return tilt(run, t, axis); });
-                       }});
+      const auto tilt = [axis](const estimator_status_t& status) -> Answer {
+        if (status.calibration == estimator_status_t::CALIBRATION_OFF) return {};
+        return kMilli * status.imu_tilt[axis];
+      };
+      list->Add(fmt::format("imu_tilt_{}_{}", kAxis[axis], when), "mrad",
+                fmt::format("tilt of the IMU about its {}, as found, {}", kAxis[axis], text),
+                MeanBefore(end, Of(&RunRecord::estimator, tilt)));
     }
   }
+}
+
+/// ms.
+Answer TouchDownDelay(const RunRecord& run) {
+  Answer worst;
+  for (const TouchDown& touch : TouchDowns(run)) {
+    if (TouchedNothing(run, touch.foot, touch.tick)) continue;
+    const auto truth = TrueTouch(run, touch.foot, touch.tick);
+    const int64_t late = truth ? touch.tick - *truth : 0;
+    worst = std::max(worst.value_or(0), kMilli * run.duration(late));
+  }
+  return worst;
+}
+
+Answer FalseTouchDowns(const RunRecord& run) {
+  if (run.planner.empty() || run.truth.empty()) return {};
+  return static_cast<double>(std::ranges::count_if(TouchDowns(run), [&](const TouchDown& touch) {
+    return TouchedNothing(run, touch.foot, touch.tick);
+  }));
 }
 
 }  // namespace
@@ -183,78 +175,39 @@ void AddCalibration(MetricList* list) {
 void AddObserver(MetricList* list) {
   AddCalibration(list);
   AddObserverErrors(list, "force", "%", "foot force, share of the weight",
-                    OfFeet([](const RunRecord& run, const Compared& c) -> Answer {
+                    [](const RunRecord& run, const Compared& c) {
                       return 100 * (c.observed - c.truth).head<3>().norm() / WeightOf(run);
-                    }));
+                    });
   AddObserverErrors(
       list, "cop", "mm", "centre of pressure in the sole, of feet with a quarter of the weight",
-      OfFeet([](const RunRecord& run, const Compared& c) -> Answer {
+      [](const RunRecord& run, const Compared& c) -> Answer {
         if (-c.truth[2] < kCopShare * WeightOf(run) || !(c.observed[2] < 0)) return {};
         const auto cop = [](const Wrench& w) { return Eigen::Vector2d(-w[4] / w[2], w[3] / w[2]); };
         return kMilli * (cop(c.observed) - cop(c.truth)).norm();
-      }));
-  list->push_back({"observer_nees_share", "",
-                   "ticks whose normalised squared error of both observed foot wrenches lies below "
-                   "21.03, which a right covariance gives for 0.95",
-                   [](const RunRecord& run) -> Answer {
-                     int64_t count = 0;
-                     const Answer inside = CountTicks(run, [&](int64_t t) -> std::optional<bool> {
-                       const Answer value = ObserverNees(run, t);
-                       if (!value) return {};
-                       ++count;
-                       return *value < kWrenchNeesBound;
-                     });
-                     if (count == 0) return {};
-                     return Scaled(inside, 1.0 / static_cast<double>(count));
-                   }});
-  list->push_back({"touch_down_delay_max", "ms",
-                   fmt::format("touch-downs as planned for, later than when the true load had been "
-                               "above {} N for {} ms, largest; 0 of those that came before",
-                               TrueTouchLoad(), kMilli * kTouchTime),
-                   [](const RunRecord& run) -> Answer {
-                     Answer worst;
-                     for (const TouchDown& touch : TouchDowns(run)) {
-                       if (TouchedNothing(run, touch.foot, touch.tick)) continue;
-                       const auto truth = TrueTouch(run, touch.foot, touch.tick);
-                       const int64_t late = truth ? touch.tick - *truth : 0;
-                       worst = std::max(worst.value_or(0), kMilli * run.duration(late));
-                     }
-                     return worst;
-                   }});
-  list->push_back({"false_touch_downs", "",
-                   fmt::format("touch-downs as planned for, of feet whose true load had not been "
-                               "above {} N in the {} ms before",
-                               NoLoad(), kMilli * kTouchTime),
-                   [](const RunRecord& run) -> Answer {
-                     if (run.planner.empty() || run.truth.empty()) return {};
-                     int found = 0;
-                     for (const TouchDown& touch : TouchDowns(run)) {
-                       found += TouchedNothing(run, touch.foot, touch.tick) ? 1 : 0;
-                     }
-                     return found;
-                   }});
-  const auto broken = [](const RunRecord& run, int64_t t) -> std::optional<bool> {
-    const estimator_status_t* status = run.estimator.at(t);
-    if (status == nullptr) return {};
-    return std::ranges::any_of(status->foot_sensor, [](int8_t state) {
-      return state > estimator_status_t::SENSOR_ABSENT;
-    });
-  };
-  list->push_back({"foot_sensor_fault_first", "s",
-                   "first time at which a foot's sensor was taken for broken",
-                   [broken](const RunRecord& run) -> Answer {
-                     return Minimum(run, [&](int64_t t) -> Answer {
-                       if (!broken(run, t).value_or(false)) return {};
-                       return run.time(t);
-                     });
-                   }});
-  list->push_back(
-      {"foot_sensor_fault_time", "s",
-       "time in which a foot's sensor was taken for broken (a robot without sensors has none)",
-       [broken](const RunRecord& run) {
-         return Scaled(CountTicks(run, [&](int64_t t) { return broken(run, t); }),
-                       run.spec.tick_period());
-       }});
+      });
+  list->Add("observer_nees_share", "",
+            "ticks whose normalised squared error of both observed foot wrenches lies below 21.03, "
+            "which a right covariance gives for 0.95",
+            ShareOf(WithinBound));
+  list->Add("touch_down_delay_max", "ms",
+            fmt::format("touch-downs as planned for, later than when the true load had been above "
+                        "{} N for {} ms, largest; 0 of those that came before",
+                        TrueTouchLoad(), kMilli * kTouchTime),
+            TouchDownDelay);
+  list->Add("false_touch_downs", "",
+            fmt::format("touch-downs as planned for, of feet whose true load had not been above {} "
+                        "N in the {} ms before",
+                        NoLoad(), kMilli * kTouchTime),
+            FalseTouchDowns);
+  const auto broken = Of(&RunRecord::estimator, [](const auto& status) {
+    return std::ranges::any_of(
+        status.foot_sensor, [](int8_t state) { return state > estimator_status_t::SENSOR_ABSENT; });
+  });
+  list->Add("foot_sensor_fault_first", "s",
+            "first time at which a foot's sensor was taken for broken", FirstTime(broken));
+  list->Add("foot_sensor_fault_time", "s",
+            "time in which a foot's sensor was taken for broken (a robot without sensors has none)",
+            TimeOf(broken));
 }
 
 }  // namespace poise::logging

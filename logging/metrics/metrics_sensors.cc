@@ -39,24 +39,22 @@ Answer PushPeak(const RunRecord& run) {
                  }));
 }
 
-void AddPush(MetricList* list) {
-  list->push_back(
-      {"push_peak", "N", "largest push, measured; none: all is the sensor's noise", PushPeak});
-  list->push_back({"push_impulse", "N·s", "size of the sum of the measured push over time",
-                   [](const RunRecord& run) -> Answer {
-                     if (!PushPeak(run)) return {};
-                     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-                     for (int64_t t = run.first_tick; t < run.num_ticks; ++t) {
-                       if (const external_push_t* push = run.push.at(t)) {
-                         sum += GetVector3(push->force) * run.spec.tick_period();
-                       }
-                     }
-                     return sum.norm();
-                   }});
+Answer PushImpulse(const RunRecord& run) {
+  if (!PushPeak(run)) return {};
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (int64_t t = run.first_tick; t < run.num_ticks; ++t) {
+    if (const external_push_t* push = run.push.at(t)) {
+      sum += GetVector3(push->force) * run.spec.tick_period();
+    }
+  }
+  return sum.norm();
 }
 
 }  // namespace
 
-void AddSensors(MetricList* list) { AddPush(list); }
+void AddSensors(MetricList* list) {
+  list->Add("push_peak", "N", "largest push, measured; none: all is the sensor's noise", PushPeak);
+  list->Add("push_impulse", "N·s", "size of the sum of the measured push over time", PushImpulse);
+}
 
 }  // namespace poise::logging

@@ -37,75 +37,74 @@ std::optional<int64_t> PushBegin(const RunRecord& run) {
   return {};
 }
 
-Answer FromPush(const RunRecord& run, std::optional<int64_t> tick) {
-  const std::optional<int64_t> push = PushBegin(run);
-  if (!push || !tick || *tick < *push) return {};
-  return run.duration(*tick - *push);
+/// s from the push's begin to what `of` tells of the first step.
+template <class F>
+Compute FirstStep(F of) {
+  return [of](const RunRecord& run) -> Answer {
+    const std::vector<Interval> steps = Steps(run);
+    const std::optional<int64_t> push = PushBegin(run);
+    const std::optional<int64_t> tick = steps.empty() ? std::nullopt : of(steps.front());
+    if (!push || !tick || *tick < *push) return {};
+    return run.duration(*tick - *push);
+  };
 }
 
-std::optional<Interval> FirstStep(const RunRecord& run) {
-  const std::vector<Interval> steps = Steps(run);
-  if (steps.empty()) return {};
-  return steps.front();
+Answer StepCount(const RunRecord& run) {
+  if (run.truth.empty()) return {};
+  return static_cast<double>(std::ranges::count_if(
+      TrueSteps(run), [&](const TrueStep& step) { return step.lifted >= run.first_tick; }));
+}
+
+/// mm.
+Answer LandingHeight(const RunRecord& run) {
+  Answer largest;
+  for (const TrueStep& step : TrueSteps(run)) {
+    const ground_truth_t* const truth = run.truth.at(step.landed);
+    if (step.lifted < run.first_tick || truth == nullptr) continue;
+    const double height =
+        truth->foot_pose[step.foot].position[2] - truth->foot_pose[1 - step.foot].position[2];
+    largest = std::max(largest, Answer(kMilli * std::abs(height)));
+  }
+  return largest;
+}
+
+Answer LongestStep(const RunRecord& run) {
+  Answer longest;
+  for (const Interval& step : Steps(run)) {
+    if (step.end) longest = std::max(longest, Answer(run.duration(*step.end - step.begin)));
+  }
+  return longest;
+}
+
+/// mm.
+Answer FootholdMargin(const RunRecord& run) {
+  Answer least;
+  for (const Interval& step : Steps(run)) {
+    const planner_status_t* planner = step.end ? run.planner.at(*step.end) : nullptr;
+    if (planner == nullptr) continue;
+    const double margin = kMilli * planner->foothold_margin;
+    least = std::min(least.value_or(margin), margin);
+  }
+  return least;
 }
 
 }  // namespace
 
 void AddStepping(MetricList* list) {
-  list->push_back({"steps", "", "feet that left the ground and carried again, in truth",
-                   [](const RunRecord& run) -> Answer {
-                     if (run.truth.empty()) return {};
-                     const std::vector<TrueStep> steps = TrueSteps(run);
-                     return static_cast<double>(std::ranges::count_if(
-                         steps, [&](const TrueStep& s) { return s.lifted >= run.first_tick; }));
-                   }});
-  list->push_back({"landing_height_max", "mm",
-                   "true height above or below the other sole at which a foot came down, largest",
-                   [](const RunRecord& run) -> Answer {
-                     Answer largest;
-                     for (const TrueStep& step : TrueSteps(run)) {
-                       const ground_truth_t* const truth = run.truth.at(step.landed);
-                       if (step.lifted < run.first_tick || truth == nullptr) continue;
-                       const double height = truth->foot_pose[step.foot].position[2] -
-                                             truth->foot_pose[1 - step.foot].position[2];
-                       largest = std::max(largest.value_or(0), kMilli * std::abs(height));
-                     }
-                     return largest;
-                   }});
-  list->push_back({"step_decision", "s", "from the push's begin to the decision for a step",
-                   [](const RunRecord& run) -> Answer {
-                     const std::optional<Interval> step = FirstStep(run);
-                     return step ? FromPush(run, step->begin) : Answer();
-                   }});
-  list->push_back({"step_touch_down", "s", "from the push's begin to the first step's touch-down",
-                   [](const RunRecord& run) -> Answer {
-                     const std::optional<Interval> step = FirstStep(run);
-                     return step ? FromPush(run, step->end) : Answer();
-                   }});
-  list->push_back({"step_duration", "s", "the longest from a step's decision to its touch-down",
-                   [](const RunRecord& run) -> Answer {
-                     Answer longest;
-                     for (const Interval& step : Steps(run)) {
-                       if (!step.end) continue;
-                       longest =
-                           std::max(longest.value_or(0), run.duration(*step.end - step.begin));
-                     }
-                     return longest;
-                   }});
-  list->push_back({"foothold_margin_min", "mm",
-                   "capture point inside the soles (negative: outside) as a foot touches down, "
-                   "planned, smallest",
-                   [](const RunRecord& run) -> Answer {
-                     Answer least;
-                     for (const Interval& step : Steps(run)) {
-                       const planner_status_t* planner =
-                           step.end ? run.planner.at(*step.end) : nullptr;
-                       if (planner == nullptr) continue;
-                       const double margin = kMilli * planner->foothold_margin;
-                       least = least ? std::min(*least, margin) : margin;
-                     }
-                     return least;
-                   }});
+  list->Add("steps", "", "feet that left the ground and carried again, in truth", StepCount);
+  list->Add("landing_height_max", "mm",
+            "true height above or below the other sole at which a foot came down, largest",
+            LandingHeight);
+  list->Add("step_decision", "s", "from the push's begin to the decision for a step",
+            FirstStep([](const Interval& step) { return std::optional(step.begin); }));
+  list->Add("step_touch_down", "s", "from the push's begin to the first step's touch-down",
+            FirstStep([](const Interval& step) { return step.end; }));
+  list->Add("step_duration", "s", "the longest from a step's decision to its touch-down",
+            LongestStep);
+  list->Add("foothold_margin_min", "mm",
+            "capture point inside the soles (negative: outside) as a foot touches down, planned, "
+            "smallest",
+            FootholdMargin);
 }
 
 }  // namespace poise::logging

@@ -38,7 +38,7 @@ Answer LiftMotion(const RunRecord& run) {
         low = std::min(low.value_or(*z), *z);
         high = std::max(high.value_or(*z), *z);
       }
-      if (low) largest = std::max(largest.value_or(0), kMilli * (*high - *low));
+      if (low) largest = std::max(largest, Answer(kMilli * (*high - *low)));
     }
   }
   return largest;
@@ -105,112 +105,83 @@ std::array<Answer, 2> SoleHalf(const RunRecord& run, size_t foot, const Edge& ed
 }
 
 /// True when the reading at a tick breaks the condition; empty out of contact or unloaded.
-std::function<std::optional<bool>(int64_t)> MeasuredViolation(const RunRecord& run, size_t foot,
-                                                              const Edge& edge) {
-  return [&run, foot, edge, half = SoleHalf(run, foot, edge)](int64_t t) -> std::optional<bool> {
-    const joint_command_t* command = run.command.at(t - 1);
-    const auto wrench = KnownWrench(run, foot, t);
-    if (command == nullptr || !wrench || command->in_contact[foot] == 0) return {};
-    const Answer limit = half[command->in_contact[0] != 0 && command->in_contact[1] != 0 ? 1 : 0];
-    const double load = -(*wrench)[2];
-    if (!limit || load < kReadableShare * run.robot.total_mass() * robot::kGravity) return {};
-    return std::abs((*wrench)[3 + edge.moment]) > load * *limit;
+auto MeasuredViolation(size_t foot, const Edge& edge) {
+  return [foot, edge](const RunRecord& run) {
+    return [&run, foot, edge, half = SoleHalf(run, foot, edge)](int64_t t) -> std::optional<bool> {
+      const joint_command_t* command = run.command.at(t - 1);
+      const auto wrench = KnownWrench(run, foot, t);
+      if (command == nullptr || !wrench || command->in_contact[foot] == 0) return {};
+      const Answer limit = half[command->in_contact[0] != 0 && command->in_contact[1] != 0 ? 1 : 0];
+      const double load = -(*wrench)[2];
+      if (!limit || load < kReadableShare * run.robot.total_mass() * robot::kGravity) return {};
+      return std::abs((*wrench)[3 + edge.moment]) > load * *limit;
+    };
   };
 }
 
 void AddViolations(MetricList* list) {
   for (size_t foot = 0; foot < 2; ++foot) {
     for (const Edge& edge : kEdges) {
-      list->push_back(
-          {fmt::format("{}_foot_{}_violation_measured", kFoot[foot], edge.name), "s",
-           fmt::format("time in which the measured wrench of the loaded {} foot breaks ({})",
-                       kFoot[foot], 29 + edge.margin),
-           [foot, edge](const RunRecord& run) {
-             return Scaled(CountTicks(run, MeasuredViolation(run, foot, edge)),
-                           run.spec.tick_period());
-           }});
-      list->push_back(
-          {fmt::format("{}_foot_{}_violation_after_contact", kFoot[foot], edge.name), "s",
-           fmt::format("time in which the measured wrench of the loaded {} foot breaks ({}) after "
-                       "it was set down",
-                       kFoot[foot], 29 + edge.margin),
-           [foot, edge](const RunRecord& run) -> Answer {
-             const std::optional<int64_t> stand = FirstStand(run, foot);
-             if (!stand) return {};
-             const auto violated = MeasuredViolation(run, foot, edge);
-             return Scaled(CountTicks(run,
-                                      [&](int64_t t) -> std::optional<bool> {
-                                        if (t < *stand) return {};
-                                        return violated(t);
-                                      }),
-                           run.spec.tick_period());
-           }});
-      list->push_back(
-          {fmt::format("{}_foot_{}_violation_first", kFoot[foot], edge.name), "s",
-           fmt::format("first time at which the measured wrench of the loaded {} foot breaks ({})",
-                       kFoot[foot], 29 + edge.margin),
-           [foot, edge](const RunRecord& run) -> Answer {
-             const auto violated = MeasuredViolation(run, foot, edge);
-             return Minimum(run, [&](int64_t t) -> Answer {
-               if (!violated(t).value_or(false)) return {};
-               return run.time(t);
-             });
-           }});
+      const auto violated = MeasuredViolation(foot, edge);
+      const auto after_contact = [=](const RunRecord& run) {
+        return [stand = FirstStand(run, foot),
+                violated = violated(run)](int64_t t) -> std::optional<bool> {
+          if (!stand || t < *stand) return {};
+          return violated(t);
+        };
+      };
+      const std::string name = fmt::format("{}_foot_{}_violation", kFoot[foot], edge.name);
+      const std::string breaks =
+          fmt::format("which the measured wrench of the loaded {} foot breaks ({})", kFoot[foot],
+                      29 + edge.margin);
+      list->Add(name + "_measured", "s", "time in " + breaks, TimeOf(violated));
+      list->Add(name + "_after_contact", "s", "time in " + breaks + " after it was set down",
+                TimeOf(after_contact));
+      list->Add(name + "_first", "s", "first time at " + breaks, FirstTime(violated));
     }
   }
 }
 
-void AddTouchDowns(MetricList* list) {
-  list->push_back({"touch_down", "s",
-                   "first time that the measured load of a foot that came down lasted",
-                   [](const RunRecord& run) -> Answer {
-                     for (const TouchDown& touch : TouchDowns(run)) {
-                       if (touch.tick >= run.first_tick) return run.time(touch.tick);
-                     }
-                     return {};
-                   }});
-  const auto count = [&](const char* name, const char* text, Timing timing) {
-    list->push_back({name, "", text, [timing](const RunRecord& run) -> Answer {
-                       if (run.planner.empty() || run.plan.empty() || !ReadSchedulePlan(run)) {
-                         return {};
-                       }
-                       int found = 0;
-                       for (const TouchDown& touch : TouchDowns(run)) {
-                         if (touch.tick < run.first_tick) continue;
-                         if (touch.timing == Timing::kUnknown) return {};
-                         found += touch.timing == timing ? 1 : 0;
-                       }
-                       return found;
-                     }});
+Answer FirstTouchDown(const RunRecord& run) {
+  for (const TouchDown& touch : TouchDowns(run)) {
+    if (touch.tick >= run.first_tick) return run.time(touch.tick);
+  }
+  return {};
+}
+
+/// How many touch-downs came so; none where the plan does not tell.
+Compute ContactCount(Timing timing) {
+  return [timing](const RunRecord& run) -> Answer {
+    if (run.planner.empty() || run.plan.empty() || !ReadSchedulePlan(run)) return {};
+    int found = 0;
+    for (const TouchDown& touch : TouchDowns(run)) {
+      if (touch.tick < run.first_tick) continue;
+      if (touch.timing == Timing::kUnknown) return {};
+      found += touch.timing == timing ? 1 : 0;
+    }
+    return found;
   };
-  count("early_contacts", "feet that touched down above the end of the foot's reference",
-        Timing::kEarly);
-  count("late_contacts", "feet that touched down below the end of the foot's reference",
-        Timing::kLate);
-  list->push_back({"no_surface_stops", "", "times that a foot found no surface and was retracted",
-                   [](const RunRecord& run) -> Answer {
-                     if (run.planner.empty()) return {};
-                     int stops = 0;
-                     for (int foot = 0; foot < 2; ++foot) {
-                       const auto f = static_cast<size_t>(foot);
-                       const auto retracted = OfTick(run.planner, [f](const planner_status_t& p) {
-                         return p.foot_state[f] == planner_status_t::FOOT_RETRACTED;
-                       });
-                       for (const Interval& stop : Intervals(run, retracted)) {
-                         stops += stop.begin >= run.first_tick ? 1 : 0;
-                       }
-                     }
-                     return stops;
-                   }});
-  list->push_back({"contact_lost_ticks", "",
-                   "ticks in which a foot that was to be loaded read no more than noise",
-                   [](const RunRecord& run) {
-                     return CountTicks(run, [&](int64_t t) -> std::optional<bool> {
-                       const auto right = ContactLost(run, 0, t), left = ContactLost(run, 1, t);
-                       if (!right && !left) return {};
-                       return right.value_or(false) || left.value_or(false);
-                     });
-                   }});
+}
+
+Answer NoSurfaceStops(const RunRecord& run) {
+  if (run.planner.empty()) return {};
+  std::ptrdiff_t stops = 0;
+  for (size_t foot = 0; foot < 2; ++foot) {
+    const auto retracted = OfTick(run.planner, [foot](const planner_status_t& planner) {
+      return planner.foot_state[foot] == planner_status_t::FOOT_RETRACTED;
+    });
+    stops += std::ranges::count_if(Intervals(run, retracted), [&](const Interval& stop) {
+      return stop.begin >= run.first_tick;
+    });
+  }
+  return static_cast<double>(stops);
+}
+
+/// Of either foot.
+std::optional<bool> AnyContactLost(const RunRecord& run, int64_t t) {
+  const auto right = ContactLost(run, 0, t), left = ContactLost(run, 1, t);
+  if (!right && !left) return {};
+  return right.value_or(false) || left.value_or(false);
 }
 
 }  // namespace
@@ -220,16 +191,26 @@ void AddTransitions(MetricList* list) {
       "largest vertical motion, peak to peak, of the foot that stops being a support, from {} s "
       "before to {} s after (ground truth)",
       kBeforeSwitch, kAfterSwitch);
-  list->push_back({"foot_lift_motion_z", "mm", lift, LiftMotion});
-  list->push_back({"foot_lift_motion_z_reference", "mm", lift + ", reference run",
-                   [](const RunRecord& run) { return OfReference(run, LiftMotion); }});
+  list->Add("foot_lift_motion_z", "mm", lift, LiftMotion);
+  list->Add("foot_lift_motion_z_reference", "mm", lift + ", reference run",
+            OfReference(LiftMotion));
   for (size_t foot = 0; foot < 2; ++foot) {
-    list->push_back(
-        {fmt::format("{}_foot_sink", kFoot[foot]), "mm",
-         fmt::format("how far the {} foot sinks after it was set down (ground truth)", kFoot[foot]),
-         [foot](const RunRecord& run) { return Sink(run, foot); }});
+    list->Add(
+        fmt::format("{}_foot_sink", kFoot[foot]), "mm",
+        fmt::format("how far the {} foot sinks after it was set down (ground truth)", kFoot[foot]),
+        [foot](const RunRecord& run) { return Sink(run, foot); });
   }
-  AddTouchDowns(list);
+  list->Add("touch_down", "s", "first time that the measured load of a foot that came down lasted",
+            FirstTouchDown);
+  list->Add("early_contacts", "", "feet that touched down above the end of the foot's reference",
+            ContactCount(Timing::kEarly));
+  list->Add("late_contacts", "", "feet that touched down below the end of the foot's reference",
+            ContactCount(Timing::kLate));
+  list->Add("no_surface_stops", "", "times that a foot found no surface and was retracted",
+            NoSurfaceStops);
+  list->Add("contact_lost_ticks", "",
+            "ticks in which a foot that was to be loaded read no more than noise",
+            TicksOf(AnyContactLost));
   AddViolations(list);
 }
 

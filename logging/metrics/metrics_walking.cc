@@ -96,46 +96,50 @@ Answer CostOfTransport(const RunRecord& run) {
   return work / (run.robot.total_mass() * robot::kGravity * way);
 }
 
+/// m/s.
+Answer FastestStride(const RunRecord& run) {
+  Answer fastest;
+  for (const Stride& stride : Strides(run)) {
+    fastest = std::max(fastest, Answer(stride.way.norm() / stride.duration));
+  }
+  return fastest;
+}
+
+/// mm/s.
+Answer VelocityError(const RunRecord& run) {
+  MeanSquare square;
+  for (const Stride& stride : Strides(run)) {
+    if (!stride.planned) continue;
+    square.Add(((stride.way - stride.commanded) / stride.duration).squaredNorm());
+  }
+  return Scaled(square.Root(), kMilli);
+}
+
+/// %, of what is commanded, that is followed; none where nothing is.
+Compute ShareOfCourse(double WalkCourse::*followed, double WalkCourse::*commanded) {
+  return [=](const RunRecord& run) -> Answer {
+    const WalkCourse course = FollowedCourse(run);
+    if (run.truth.empty() || !(course.*commanded > 0)) return {};
+    return 100 * course.*followed / course.*commanded;
+  };
+}
+
 }  // namespace
 
 void AddWalking(MetricList* list) {
-  list->push_back({"walk_speed_max", "m/s", "walking, fastest mean of two steps",
-                   [](const RunRecord& run) -> Answer {
-                     Answer fastest;
-                     for (const Stride& stride : Strides(run)) {
-                       const double speed = stride.way.norm() / stride.duration;
-                       fastest = std::max(fastest.value_or(0), speed);
-                     }
-                     return fastest;
-                   }});
-  list->push_back({"walk_velocity_error_rms", "mm/s",
-                   "walking, mean velocity of two steps less the planner's commanded one, RMS",
-                   [](const RunRecord& run) {
-                     MeanSquare square;
-                     for (const Stride& stride : Strides(run)) {
-                       if (!stride.planned) continue;
-                       square.Add(
-                           ((stride.way - stride.commanded) / stride.duration).squaredNorm());
-                     }
-                     return Scaled(square.Root(), kMilli);
-                   }});
-  list->push_back({"walk_way", "m", "walking, way of the COM between touch-downs", Way});
-  list->push_back({"walk_course_share", "%",
-                   "walking, way of the COM along the scenario's commands, of what they ask for",
-                   [](const RunRecord& run) -> Answer {
-                     const WalkCourse course = FollowedCourse(run);
-                     if (run.truth.empty() || !(course.commanded_way > 0)) return {};
-                     return 100 * course.way / course.commanded_way;
-                   }});
-  list->push_back({"walk_turn_share", "%",
-                   "walking, turn in the sense of the scenario's commands, of what they ask for",
-                   [](const RunRecord& run) -> Answer {
-                     const WalkCourse course = FollowedCourse(run);
-                     if (run.truth.empty() || !(course.commanded_turn > 0)) return {};
-                     return 100 * course.turn / course.commanded_turn;
-                   }});
-  list->push_back({"walk_cost_of_transport", "",
-                   "walking, positive work of the joints over weight and way", CostOfTransport});
+  list->Add("walk_speed_max", "m/s", "walking, fastest mean of two steps", FastestStride);
+  list->Add("walk_velocity_error_rms", "mm/s",
+            "walking, mean velocity of two steps less the planner's commanded one, RMS",
+            VelocityError);
+  list->Add("walk_way", "m", "walking, way of the COM between touch-downs", Way);
+  list->Add("walk_course_share", "%",
+            "walking, way of the COM along the scenario's commands, of what they ask for",
+            ShareOfCourse(&WalkCourse::way, &WalkCourse::commanded_way));
+  list->Add("walk_turn_share", "%",
+            "walking, turn in the sense of the scenario's commands, of what they ask for",
+            ShareOfCourse(&WalkCourse::turn, &WalkCourse::commanded_turn));
+  list->Add("walk_cost_of_transport", "",
+            "walking, positive work of the joints over weight and way", CostOfTransport);
 }
 
 }  // namespace poise::logging

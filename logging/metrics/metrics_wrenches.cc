@@ -1,6 +1,6 @@
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
+#include <vector>
 
 #include "components/messages/conversions.h"
 #include "fmt/format.h"
@@ -10,15 +10,17 @@ namespace poise::logging {
 namespace {
 
 /// Root of the mean square of measured less computed wrenches of `feet`, `square` of each.
-Answer WrenchErrorRms(const RunRecord& run, std::initializer_list<int> feet,
-                      const std::function<double(const balance::Vector6d&)>& square) {
-  MeanSquare mean;
-  for (int64_t t = run.first_tick; t < run.num_ticks; ++t) {
-    for (const int foot : feet) {
-      if (const auto e = WrenchError(run, foot, t)) mean.Add(square(*e));
+template <class Square>
+Compute WrenchErrorRms(std::vector<int> feet, Square square) {
+  return [=](const RunRecord& run) {
+    MeanSquare mean;
+    for (int64_t t = run.first_tick; t < run.num_ticks; ++t) {
+      for (const int foot : feet) {
+        if (const auto e = WrenchError(run, foot, t)) mean.Add(square(*e));
+      }
     }
-  }
-  return mean.Root();
+    return mean.Root();
+  };
 }
 
 /// The force errors of both feet in the world's axes, and the ratio they were computed for.
@@ -39,13 +41,13 @@ std::optional<ForceErrors> BothForceErrors(const RunRecord& run, int64_t tick) {
 /// With e = measured less computed and E = e_r + e_l: e_r = eta E + i, e_l = (1 - eta) E - i.
 void AddInternalError(MetricList* list) {
   const auto add = [&](const char* name, const char* text, auto square) {
-    list->push_back({name, "N", text, [square](const RunRecord& run) {
-                       MeanSquare mean;
-                       for (int64_t t = run.first_tick; t < run.num_ticks; ++t) {
-                         if (const auto e = BothForceErrors(run, t)) mean.Add(square(*e));
-                       }
-                       return mean.Root();
-                     }});
+    list->Add(name, "N", text, [square](const RunRecord& run) {
+      MeanSquare mean;
+      for (int64_t t = run.first_tick; t < run.num_ticks; ++t) {
+        if (const auto e = BothForceErrors(run, t)) mean.Add(square(*e));
+      }
+      return mean.Root();
+    });
   };
   add("foot_force_error_internal_rms",
       "the same while on both feet, of the part with opposite signs that moves nothing, RMS",
@@ -57,60 +59,57 @@ void AddInternalError(MetricList* list) {
       });
 }
 
-void AddFootErrors(MetricList* list) {
+void AddWrenchErrors(MetricList* list) {
+  using W = balance::Vector6d;
+  list->Add("foot_force_error_rms", "N", "measured less computed foot force, RMS",
+            WrenchErrorRms({0, 1}, [](const W& e) { return e.head<3>().squaredNorm(); }));
+  list->Add("foot_moment_error_rms", "N·m", "measured less computed foot moment, RMS",
+            WrenchErrorRms({0, 1}, [](const W& e) { return e.tail<3>().squaredNorm(); }));
+  AddInternalError(list);
   const auto add = [&](const char* name, const char* unit, const char* text, auto square) {
     for (int foot = 0; foot < 2; ++foot) {
-      list->push_back(
-          {fmt::format("{}_foot_{}_error_rms", kFoot[foot], name), unit,
-           fmt::format("measured less computed {} of the {} foot, RMS", text, kFoot[foot]),
-           [foot, square](const RunRecord& run) { return WrenchErrorRms(run, {foot}, square); }});
+      list->Add(fmt::format("{}_foot_{}_error_rms", kFoot[foot], name), unit,
+                fmt::format("measured less computed {} of the {} foot, RMS", text, kFoot[foot]),
+                WrenchErrorRms({foot}, square));
     }
   };
-  using W = balance::Vector6d;
   add("force_z", "N", "F_z", [](const W& e) { return e[2] * e[2]; });
   add("force_xy", "N", "(F_x, F_y)", [](const W& e) { return e.head<2>().squaredNorm(); });
   add("moment_xy", "N·m", "(M_x, M_y)", [](const W& e) { return e.segment<2>(3).squaredNorm(); });
   add("moment_z", "N·m", "M_z", [](const W& e) { return e[5] * e[5]; });
 }
 
-/// N, 0 - F_z (never minus zero) of a foot in contact: computed at `tick`, or read there for the
+/// N, 0 - F_z (never minus zero) of a foot in contact: computed at a tick, or read there for the
 /// command before.
-Answer FootLoad(const RunRecord& run, size_t foot, bool measured, int64_t tick) {
-  auto wrench = ComputedWrench(run, foot, measured ? tick - 1 : tick);
-  if (wrench && measured) wrench = KnownWrench(run, foot, tick);
-  if (!wrench) return {};
-  return 0.0 - (*wrench)[2];
-}
-
 void AddFootLoads(MetricList* list) {
   for (size_t foot = 0; foot < 2; ++foot) {
     for (const bool measured : {false, true}) {
       const char* kind = measured ? "measured" : "computed";
-      const auto load = [foot, measured](const RunRecord& run) {
-        return [&run, foot, measured](int64_t t) { return FootLoad(run, foot, measured, t); };
+      const auto load = [foot, measured](const RunRecord& run, int64_t tick) -> Answer {
+        auto wrench = ComputedWrench(run, foot, measured ? tick - 1 : tick);
+        if (wrench && measured) wrench = KnownWrench(run, foot, tick);
+        return wrench ? Answer(0.0 - (*wrench)[2]) : Answer();
       };
-      list->push_back({fmt::format("{}_foot_load_{}_min", kFoot[foot], kind), "N",
-                       fmt::format("smallest {} load of the {} foot in contact", kind, kFoot[foot]),
-                       [load](const RunRecord& run) { return Minimum(run, load(run)); }});
-      list->push_back({fmt::format("{}_foot_load_{}_max", kFoot[foot], kind), "N",
-                       fmt::format("largest {} load of the {} foot in contact", kind, kFoot[foot]),
-                       [load](const RunRecord& run) { return Maximum(run, load(run)); }});
+      list->Add(fmt::format("{}_foot_load_{}_min", kFoot[foot], kind), "N",
+                fmt::format("smallest {} load of the {} foot in contact", kind, kFoot[foot]),
+                Smallest(load));
+      list->Add(fmt::format("{}_foot_load_{}_max", kFoot[foot], kind), "N",
+                fmt::format("largest {} load of the {} foot in contact", kind, kFoot[foot]),
+                Largest(load));
     }
   }
 }
 
 void AddTangential(MetricList* list) {
   const auto add = [&](const char* name, const char* unit, const char* text, auto size) {
-    list->push_back({name, unit, text, [size](const RunRecord& run) {
-                       return Maximum(run, [&](int64_t t) -> Answer {
-                         Answer largest;
-                         for (size_t foot = 0; foot < 2; ++foot) {
-                           const auto wrench = ComputedWrench(run, foot, t);
-                           if (wrench) largest = std::max(largest.value_or(0), size(*wrench));
-                         }
-                         return largest;
-                       });
-                     }});
+    list->Add(name, unit, text, Largest([size](const RunRecord& run, int64_t t) {
+                Answer largest;
+                for (size_t foot = 0; foot < 2; ++foot) {
+                  const auto wrench = ComputedWrench(run, foot, t);
+                  if (wrench) largest = std::max(largest, Answer(size(*wrench)));
+                }
+                return largest;
+              }));
   };
   add("foot_tangential_force_computed_max", "N", "largest computed (F_x, F_y) of a foot",
       [](const Wrench& w) { return std::hypot(w[0], w[1]); });
@@ -118,70 +117,48 @@ void AddTangential(MetricList* list) {
       [](const Wrench& w) { return std::abs(w[5]); });
 }
 
-/// Largest less smallest ratio while both feet are in contact.
-Answer RatioSpan(const RunRecord& run) {
-  const auto ratio = [&](int64_t t) -> Answer {
-    const joint_command_t* command = run.command.at(t);
-    if (command == nullptr || command->in_contact[0] == 0 || command->in_contact[1] == 0 ||
-        !TellsRatio(*command)) {
-      return {};
-    }
-    return command->eta;
+void AddRatio(MetricList* list) {
+  const auto infeasible = [](const joint_command_t& command) -> std::optional<bool> {
+    if (!TellsRatio(command)) return {};
+    return command.eta_feasible == 0;
   };
-  const Answer lowest = Minimum(run, ratio), highest = Maximum(run, ratio);
-  if (!lowest || !highest) return {};
-  return *highest - *lowest;
+  list->Add("eta_infeasible_ticks", "", "ticks in which no ratio eta met all conditions",
+            TicksOf(Of(&RunRecord::command, infeasible)));
+  const auto eta = Of(&RunRecord::command, [](const auto& command) {
+    return TellsRatio(command) ? Answer(command.eta) : Answer();
+  });
+  list->Add("eta_lowest", "", "smallest ratio eta, (61)", Smallest(eta));
+  list->Add("eta_highest", "", "largest ratio eta, (61)", Largest(eta));
+  const auto on_both = Of(&RunRecord::command, [](const auto& command) {
+    const bool both = command.in_contact[0] != 0 && command.in_contact[1] != 0;
+    return both && TellsRatio(command) ? Answer(command.eta) : Answer();
+  });
+  list->Add("eta_span", "", "largest less smallest ratio eta while on both feet",
+            [lowest = Smallest(on_both), highest = Largest(on_both)](const RunRecord& run) {
+              const Answer low = lowest(run), high = highest(run);
+              return low && high ? Answer(*high - *low) : Answer();
+            });
 }
 
 }  // namespace
 
 void AddWrenches(MetricList* list) {
-  list->push_back({"violated_ticks", "", "ticks in which a computed wrench breaks a condition",
-                   [](const RunRecord& run) {
-                     return CountTicks(run, [&](int64_t t) { return Violated(run, t); });
-                   }});
-  list->push_back({"eta_infeasible_ticks", "", "ticks in which no ratio eta met all conditions",
-                   [](const RunRecord& run) {
-                     const auto none = [](const joint_command_t& command) -> std::optional<bool> {
-                       if (!TellsRatio(command)) return {};
-                       return command.eta_feasible == 0;
-                     };
-                     return CountTicks(run, OfTick(run.command, none));
-                   }});
-  const auto eta = [](const RunRecord& run) {
-    return OfTick(run.command, [](const joint_command_t& command) {
-      return TellsRatio(command) ? Answer(command.eta) : Answer();
-    });
-  };
-  list->push_back({"eta_lowest", "", "smallest ratio eta, (61)",
-                   [eta](const RunRecord& run) { return Minimum(run, eta(run)); }});
-  list->push_back({"eta_highest", "", "largest ratio eta, (61)",
-                   [eta](const RunRecord& run) { return Maximum(run, eta(run)); }});
-  list->push_back(
-      {"eta_span", "", "largest less smallest ratio eta while on both feet", RatioSpan});
+  list->Add("violated_ticks", "", "ticks in which a computed wrench breaks a condition",
+            TicksOf(Violated));
+  AddRatio(list);
   constexpr const char* kMargin[] = {"normal", "friction", "yaw", "roll", "pitch"};
   for (int foot = 0; foot < 2; ++foot) {
     for (int margin = 0; margin < 5; ++margin) {
-      list->push_back(
-          {fmt::format("{}_foot_{}_margin", kFoot[foot], kMargin[margin]), margin < 2 ? "N" : "N·m",
-           fmt::format("smallest margin of the {} foot's computed wrench, ({})", kFoot[foot],
-                       29 + margin),
-           [foot, margin](const RunRecord& run) {
-             return Minimum(run, [&](int64_t t) { return FootMargin(run, foot, margin, t); });
-           }});
+      list->Add(fmt::format("{}_foot_{}_margin", kFoot[foot], kMargin[margin]),
+                margin < 2 ? "N" : "N·m",
+                fmt::format("smallest margin of the {} foot's computed wrench, ({})", kFoot[foot],
+                            29 + margin),
+                Smallest([foot, margin](const RunRecord& run, int64_t t) {
+                  return FootMargin(run, foot, margin, t);
+                }));
     }
   }
-  const auto error = [&](const char* name, const char* unit, const char* text, int first) {
-    list->push_back({name, unit, text, [first](const RunRecord& run) {
-                       return WrenchErrorRms(run, {0, 1}, [first](const balance::Vector6d& e) {
-                         return e.segment<3>(first).squaredNorm();
-                       });
-                     }});
-  };
-  error("foot_force_error_rms", "N", "measured less computed foot force, RMS", 0);
-  error("foot_moment_error_rms", "N·m", "measured less computed foot moment, RMS", 3);
-  AddInternalError(list);
-  AddFootErrors(list);
+  AddWrenchErrors(list);
   AddFootLoads(list);
   AddTangential(list);
 }
