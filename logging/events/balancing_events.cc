@@ -147,9 +147,7 @@ void AddSteps(const RunRecord& run, EventList* events) {
                     catches ? fmt::format(" (planned {})", Inside(step.planned_margin)) : ""));
   }
   int8_t before = planner_status_t::STEPPING_NONE;
-  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const planner_status_t* planner = run.planner.at(tick);
-    if (planner == nullptr) continue;
+  for (const auto& [tick, planner] : Messages(run.planner, 0, run.num_ticks)) {
     if (before != planner_status_t::STEPPING_NONE &&
         planner->stepping == planner_status_t::STEPPING_NONE) {
       events->Add(tick, "step_rests", "the COM is at rest between the feet");

@@ -158,9 +158,7 @@ void AddMotorEvents(const RunRecord& run, EventList* events) {
 void AddBridgeEvents(const RunRecord& run, EventList* events) {
   const ElementNames names(run.robot);
   const bridge_status_t* before = nullptr;
-  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const bridge_status_t* bridge = run.bridge.at(tick);
-    if (bridge == nullptr) continue;
+  for (const auto& [tick, bridge] : Messages(run.bridge, 0, run.num_ticks)) {
     if (before != nullptr && bridge->state != before->state) {
       std::string reason = BridgeReasonText(*bridge, names);
       if (bridge->reason == bridge_status_t::REASON_COMMAND_NOT_FINITE) {

@@ -58,9 +58,7 @@ void AddPush(const RunRecord& run, bool ended, EventList* events) {
 void AddCrane(const RunRecord& run, EventList* events) {
   double most = 0;
   bool held = false;
-  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const ground_truth_t* truth = run.truth.at(tick);
-    if (truth == nullptr) continue;
+  for (const auto& [tick, truth] : Messages(run.truth, 0, run.num_ticks)) {
     if (held && truth->crane_share == 0) {
       events->Add(tick, "crane_let_go",
                   fmt::format("it carried {:.0f} N at most, {:.3f} s after the start", most,

@@ -26,9 +26,7 @@ constexpr double kTipsShare = 0.3, kTipsDistance = 1e-3, kTipsGap = 0.01, kLeast
 
 void AddFootEvents(const RunRecord& run, bool ended, EventList* events) {
   const planner_status_t* before = nullptr;
-  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const planner_status_t* planner = run.planner.at(tick);
-    if (planner == nullptr) continue;
+  for (const auto& [tick, planner] : Messages(run.planner, 0, run.num_ticks)) {
     for (size_t foot = 0; before != nullptr && foot < 2; ++foot) {
       const int8_t is = planner->foot_state[foot];
       if (is == before->foot_state[foot]) continue;

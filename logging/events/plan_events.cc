@@ -30,9 +30,7 @@ void AddPhases(const RunRecord& run, EventList* events) {
   const std::optional<SchedulePlan> schedule = ReadSchedulePlan(run);
   std::optional<int32_t> phase;
   double last_time = 0;
-  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const planner_status_t* planner = run.planner.at(tick);
-    if (planner == nullptr) continue;
+  for (const auto& [tick, planner] : Messages(run.planner, 0, run.num_ticks)) {
     // A phase may follow itself: then its time begins anew.
     const bool began = planner->phase != phase || planner->phase_time < last_time;
     last_time = planner->phase_time;

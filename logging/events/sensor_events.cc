@@ -45,9 +45,7 @@ void AddFootSensors(const RunRecord& run, EventList* events) {
 void AddCalibration(const RunRecord& run, EventList* events) {
   const estimator_status_t* last = nullptr;
   bool ran = false;
-  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
-    const estimator_status_t* status = run.estimator.at(tick);
-    if (status == nullptr) continue;
+  for (const auto& [tick, status] : Messages(run.estimator, run.first_tick, run.num_ticks)) {
     last = status;
     ran = ran || status->calibration == estimator_status_t::CALIBRATION_RUNNING;
   }

@@ -3,9 +3,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <functional>
 #include <optional>
+#include <ranges>
 #include <type_traits>
+#include <utility>
 
 #include "components/balance/convex_polygon.h"
 #include "logging/derived/definitions.h"
@@ -51,6 +54,14 @@ auto OfTick(const Series<T>& series, const Series<U>& other, F of) {
     const U* const beside = other.at(tick);
     return message != nullptr && beside != nullptr ? Told(of(*message, *beside)) : Told();
   };
+}
+
+/// The messages of a series in ticks [first, end), each with its tick, in order.
+template <class T>
+auto Messages(const Series<T>& series, int64_t first, int64_t end) {
+  return std::views::iota(first, std::max(first, end)) |
+         std::views::transform([&](int64_t tick) { return std::pair(tick, series.at(tick)); }) |
+         std::views::filter([](const auto& message) { return message.second != nullptr; });
 }
 
 /// Balancing, section 5: on at a tick when the CoP is controlled along x or y.

@@ -98,9 +98,7 @@ std::vector<TouchDown> TouchDowns(const RunRecord& run) {
   ReferenceEnds ends(run);
   const planner_status_t* before = nullptr;
   std::array<bool, 2> down{};  // a sole that bounces touches down once
-  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const planner_status_t* planner = run.planner.at(tick);
-    if (planner == nullptr) continue;
+  for (const auto& [tick, planner] : Messages(run.planner, 0, run.num_ticks)) {
     if (const support_plan_t* plan = run.plan.at(tick)) ends.Update(*planner, *plan);
     for (size_t foot = 0; before != nullptr && foot < 2; ++foot) {
       const int8_t was = before->foot_state[foot], is = planner->foot_state[foot];

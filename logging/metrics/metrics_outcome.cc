@@ -16,9 +16,8 @@ void AddOutcome(MetricList* list) {
   const auto count_all = [&](const char* name, const char* text, auto series, auto holds) {
     list->Add(name, "", text, [series, holds](const RunRecord& run) {
       Answer count;
-      for (int64_t t = 0; t < run.num_ticks; ++t) {
-        const auto* const message = (run.*series).at(t);
-        if (message != nullptr) count = count.value_or(0) + (holds(*message) ? 1 : 0);
+      for (const auto& [tick, message] : Messages(run.*series, 0, run.num_ticks)) {
+        count = count.value_or(0) + (holds(*message) ? 1 : 0);
       }
       return count;
     });

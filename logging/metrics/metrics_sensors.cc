@@ -42,10 +42,8 @@ Answer PushPeak(const RunRecord& run) {
 Answer PushImpulse(const RunRecord& run) {
   if (!PushPeak(run)) return {};
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (int64_t t = run.first_tick; t < run.num_ticks; ++t) {
-    if (const external_push_t* push = run.push.at(t)) {
-      sum += GetVector3(push->force) * run.spec.tick_period();
-    }
+  for (const auto& [tick, push] : Messages(run.push, run.first_tick, run.num_ticks)) {
+    sum += GetVector3(push->force) * run.spec.tick_period();
   }
   return sum.norm();
 }

@@ -23,16 +23,12 @@ constexpr double kPushShare = 0.05;
 
 /// The first tick that was pushed in.
 std::optional<int64_t> PushBegin(const RunRecord& run) {
-  double largest = 0;
-  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
-    if (const external_push_t* push = run.push.at(tick)) {
-      largest = std::max(largest, GetVector3(push->force).norm());
-    }
-  }
-  if (!(largest > 0)) return {};
-  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
-    const external_push_t* push = run.push.at(tick);
-    if (push != nullptr && GetVector3(push->force).norm() > kPushShare * largest) return tick;
+  const Answer largest = Maximum(run, OfTick(run.push, [](const external_push_t& push) {
+                                   return GetVector3(push.force).norm();
+                                 }));
+  if (!largest) return {};
+  for (const auto& [tick, push] : Messages(run.push, run.first_tick, run.num_ticks)) {
+    if (GetVector3(push->force).norm() > kPushShare * *largest) return tick;
   }
   return {};
 }

@@ -95,9 +95,7 @@ Answer TorqueChange(const RunRecord& run, int64_t tick, size_t joint) {
 Answer TorqueLimited(const RunRecord& run) {
   constexpr int kLimits = bridge_status_t::LIMIT_TORQUE | bridge_status_t::LIMIT_THERMAL;
   Answer count;
-  for (int64_t t = run.first_tick; t < run.num_ticks; ++t) {
-    const bridge_status_t* bridge = run.bridge.at(t);
-    if (bridge == nullptr) continue;
+  for (const auto& [t, bridge] : Messages(run.bridge, run.first_tick, run.num_ticks)) {
     const auto limited =
         std::ranges::count_if(bridge->saturated, [](int8_t bits) { return (bits & kLimits) != 0; });
     count = count.value_or(0) + static_cast<double>(limited);

@@ -29,9 +29,7 @@ struct Stride {
 /// The planner walks in every tick of [begin, end) that it tells of, and in one at least.
 bool PlannerWalks(const RunRecord& run, int64_t begin, int64_t end) {
   bool walks = false;
-  for (int64_t t = begin; t < end; ++t) {
-    const planner_status_t* planner = run.planner.at(t);
-    if (planner == nullptr) continue;
+  for (const auto& [t, planner] : Messages(run.planner, begin, end)) {
     walks = planner->stepping != planner_status_t::STEPPING_NONE &&
             planner->step_reason == planner_status_t::REASON_WALK;
     if (!walks) return false;
@@ -84,9 +82,7 @@ Answer CostOfTransport(const RunRecord& run) {
   double work = 0, way = 0;
   for (const Stride& stride : Strides(run)) {
     way += stride.way.norm();
-    for (int64_t t = stride.begin; t < stride.end; ++t) {
-      const ground_truth_t* truth = run.truth.at(t);
-      if (truth == nullptr) continue;
+    for (const auto& [t, truth] : Messages(run.truth, stride.begin, stride.end)) {
       for (size_t j = 0; j < truth->joint_torque.size(); ++j) {
         work += run.duration(1) * std::max(0.0, truth->joint_torque[j] * truth->joint_velocity[j]);
       }

@@ -1,5 +1,7 @@
 #include "logging/metrics/planner_steps.h"
 
+#include "logging/metrics/analysis.h"
+
 namespace poise::logging {
 
 const char* StepReason(int8_t reason) {
@@ -30,9 +32,7 @@ std::vector<PlannerStep> PlannerSteps(const RunRecord& run) {
   bool known = false;
   int32_t count = 0;
   int8_t stepping = planner_status_t::STEPPING_NONE;
-  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const planner_status_t* const planner = run.planner.at(tick);
-    if (planner == nullptr) continue;
+  for (const auto& [tick, planner] : Messages(run.planner, 0, run.num_ticks)) {
     const auto foot = static_cast<size_t>(planner->step_foot);
     const bool named = planner->step_foot >= 0 && planner->step_foot < planner->num_feet;
     const Eigen::Vector2d foothold(planner->foothold[0], planner->foothold[1]);

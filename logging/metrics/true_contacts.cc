@@ -25,8 +25,8 @@ Eigen::Vector3d Up(const ground_truth_t& truth) {
 
 /// The truth at time 0, or where a part of a run begins; nullptr: there is none.
 const ground_truth_t* Start(const RunRecord& run) {
-  for (int64_t tick = run.spec.lead_ticks(); tick < run.num_ticks; ++tick) {
-    if (const ground_truth_t* truth = run.truth.at(tick)) return truth;
+  for (const auto& [tick, truth] : Messages(run.truth, run.spec.lead_ticks(), run.num_ticks)) {
+    return truth;
   }
   return nullptr;
 }
@@ -84,9 +84,7 @@ std::optional<bool> IsDown(const RunRecord& run, int64_t tick) {
 
 std::optional<int64_t> DownTick(const RunRecord& run) {
   const Stance stance(run);
-  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const ground_truth_t* const truth = run.truth.at(tick);
-    if (truth == nullptr) continue;
+  for (const auto& [tick, truth] : Messages(run.truth, 0, run.num_ticks)) {
     if (tick < run.spec.lead_ticks() ? truth->fallen != 0 : stance.Left(*truth)) return tick;
   }
   return {};
