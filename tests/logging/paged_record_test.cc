@@ -89,14 +89,14 @@ TEST_F(PagedRecordTest, RowsHoldEverySampleBetweenTheirBounds) {
   const std::vector<ChannelColumns> all = ReadColumns(path_, run);
   for (const int64_t most : {3, 17, 60}) {
     const PageRows rows(0, kTicks, most, 1.0, {});  // at 1 s a tick nothing has surroundings
-    const std::vector<ChannelRows> channels = ReadRows(path_, run, rows);
+    const std::vector<ChannelColumns> channels = ReadRows(path_, run, rows);
     ASSERT_EQ(channels.size(), all.size());
     for (size_t c = 0; c < all.size(); ++c) {
       EXPECT_EQ(channels[c].messages, kTicks);
       ASSERT_EQ(channels[c].columns.size(), all[c].columns.size());
       for (size_t k = 0; k < all[c].columns.size(); ++k) {
         const SignalColumn& column = all[c].columns[k];
-        const RowColumn& row = channels[c].columns[k];
+        const SignalColumn& row = channels[c].columns[k];
         ASSERT_EQ(row.field, column.field);
         // NaN is no number of a row: the first, the least and the largest are of the others.
         std::vector<double> first(static_cast<size_t>(rows.size()), std::nan("")), least = first,

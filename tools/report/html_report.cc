@@ -136,38 +136,22 @@ class BlobWriter {
   std::map<std::string, std::string> blobs_;  // id by content
 };
 
-Json ChannelsJson(const std::vector<logging::ChannelColumns>& channels, int64_t num_ticks,
-                  BlobWriter* blobs) {
+/// Writes the channels of a page with a row a tick, or with `rows` that hold several.
+Json ChannelsJson(const std::vector<logging::ChannelColumns>& channels, bool rows,
+                  int64_t num_ticks, BlobWriter* blobs) {
+  constexpr double kFew = 0.2;  // of the ticks, as in web/src/data.js
   Json json = Json::array();
   for (const logging::ChannelColumns& channel : channels) {
-    Json item = {{"name", channel.name}, {"type", channel.type}, {"count", channel.ticks.size()}};
-    if (static_cast<int64_t>(channel.ticks.size()) != num_ticks) {
+    Json item = {{"name", channel.name}, {"type", channel.type}, {"count", channel.messages}};
+    if (rows && static_cast<double>(channel.messages) < kFew * static_cast<double>(num_ticks)) {
+      item["sparse"] = true;
+    }
+    if (!rows && channel.messages != num_ticks) {
       const std::vector<double> ticks(channel.ticks.begin(), channel.ticks.end());
       item["ticks"] = blobs->Add(ticks, true);
     }
     item["signals"] = Json::array();
     for (const logging::SignalColumn& column : channel.columns) {
-      Json signal = {{"field", column.field}, {"integer", column.integer}};
-      signal.update(blobs->Add(column.values, column.integer));
-      item["signals"].push_back(std::move(signal));
-    }
-    json.push_back(std::move(item));
-  }
-  return json;
-}
-
-/// Writes the channels of a page whose rows hold several ticks.
-Json RowChannelsJson(const std::vector<logging::ChannelRows>& channels, int64_t num_ticks,
-                     BlobWriter* blobs) {
-  constexpr double kFew = 0.2;  // of the ticks, as in web/src/data.js
-  Json json = Json::array();
-  for (const logging::ChannelRows& channel : channels) {
-    Json item = {{"name", channel.name}, {"type", channel.type}, {"count", channel.messages}};
-    if (static_cast<double>(channel.messages) < kFew * static_cast<double>(num_ticks)) {
-      item["sparse"] = true;
-    }
-    item["signals"] = Json::array();
-    for (const logging::RowColumn& column : channel.columns) {
       Json signal = {{"field", column.field}, {"integer", column.integer}};
       signal.update(blobs->Add(column.values, column.integer));
       const auto same = [](double a, double b) {
@@ -252,18 +236,17 @@ void WriteRun(const ReportedRun& run, size_t index, double megabytes, std::ostre
   json["story"] = TellRun(run.record, run.checks, events, "");
   BlobWriter blobs(out, index);
   const logging::PageRows rows = RowsOf(run.record, events, megabytes);
-  if (rows.every_tick()) {
-    json["channels"] =
-        ChannelsJson(logging::ReadColumns(run.log, run.record), run.record.num_ticks, &blobs);
-  } else {
+  if (!rows.every_tick()) {
     json["rows"] = Json::array();
     for (const logging::RowSpan& span : rows.spans()) {
       json["rows"].push_back({span.first_tick, span.stride, span.count});
     }
     json["events_without_detail"] = rows.left_out();
-    json["channels"] =
-        RowChannelsJson(logging::ReadRows(run.log, run.record, rows), run.record.num_ticks, &blobs);
   }
+  const std::vector<logging::ChannelColumns> channels =
+      rows.every_tick() ? logging::ReadColumns(run.log, run.record)
+                        : logging::ReadRows(run.log, run.record, rows);
+  json["channels"] = ChannelsJson(channels, !rows.every_tick(), run.record.num_ticks, &blobs);
   WriteData("run", json, out);
 }
 
