@@ -3,6 +3,9 @@
 
 #include <string>
 #include <string_view>
+#include <utility>
+
+#include "fmt/format.h"
 
 namespace poise {
 
@@ -30,6 +33,13 @@ int DisplayWidth(std::string_view text);
 /// Breaks `text` at spaces into lines of at most `width` columns, each but the first after `indent`
 /// spaces; a longer word stands alone. Its own line breaks stay. Ends without one.
 std::string Wrapped(std::string_view text, int width, int indent = 0);
+
+/// What is formatted, Wrapped to the columns of stdout, with its end.
+template <class... Args>
+std::string ScreenLines(int indent, fmt::format_string<Args...> format, Args&&... args) {
+  const std::string text = fmt::format(format, std::forward<Args>(args)...);
+  return Wrapped(text, ScreenStyle().columns, indent) + "\n";
+}
 
 /// `text` with the characters that Poise uses in ASCII: "-" for "─", ">=" for "≥". Others stay.
 std::string PlainText(std::string_view text);

@@ -151,6 +151,15 @@ std::string FormatColumns(std::vector<TableRow> rows, int width) {
   return text;
 }
 
+std::string CsvLine(const std::vector<std::string>& cells) {
+  std::string line;
+  for (const std::string& cell : cells) {
+    if (&cell != &cells.front()) line += ',';
+    line += CsvCell(cell);
+  }
+  return line + '\n';
+}
+
 // Not fmt::join, which GCC 12 misreads here.
 std::string Joined(const std::vector<std::string>& parts, std::string_view separator) {
   std::string text;

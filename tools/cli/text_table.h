@@ -35,6 +35,8 @@ using TableRow = std::vector<TableCell>;
 std::string FormatColumns(std::vector<TableRow> rows, int width = ScreenStyle().columns);
 
 using logging::CsvCell;
+/// A line of a CSV file, with its end.
+std::string CsvLine(const std::vector<std::string>& cells);
 /// A number as a cell of a CSV file; empty without one.
 template <class Number>
 std::string CsvNumber(const std::optional<Number>& value) {

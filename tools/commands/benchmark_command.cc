@@ -6,7 +6,6 @@
 #include <iterator>
 #include <memory>
 #include <optional>
-#include <thread>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/suggest.h"
@@ -160,19 +159,18 @@ int RunBenchmark(const BenchmarkArguments& arguments) {
 }  // namespace
 
 void AddBenchmarkCommand(CLI::App* app, Command* command) {
-  auto arguments = std::make_shared<BenchmarkArguments>();
+  const auto [benchmark, arguments] = AddCommand<BenchmarkArguments>(
+      app, command, "benchmark",
+      "measure how well a controller balances, by a fixed set of disturbances", RunBenchmark);
   BenchmarkSubject* const subject = &arguments->subject;
   SessionOptions* const session = &arguments->session;
-  session->jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  CLI::App* benchmark = app->add_subcommand(
-      "benchmark", "measure how well a controller balances, by a fixed set of disturbances");
   benchmark->add_option("benchmark", arguments->set, "of deploy/benchmarks, or a .pbtxt file")
       ->capture_default_str();
   benchmark
       ->add_option("--robot", subject->robot,
                    "a name (poise list robots), a robot's folder or its .pbtxt file")
       ->capture_default_str();
-  benchmark->add_option("--world", subject->engine, "engine: ode or mujoco; default: the graph's");
+  AddWorld(benchmark, &subject->engine, "the graph's");
   CLI::Option* const graph = benchmark->add_option(
       "--graph", subject->graph,
       "the controller's graph (poise list graphs) or a .pbtxt file; default: balance, Poise's own");
@@ -185,18 +183,13 @@ void AddBenchmarkCommand(CLI::App* app, Command* command) {
   AddList(benchmark, "--without", &subject->without, "leave out a part of Poise's controller",
           "PART")
       ->check(CLI::IsMember(RemovableParts()));
-  benchmark
-      ->add_option("--drives", subject->drives,
-                   "emulated drives between bridge and robot, as of poise run; runs as processes")
-      ->check(CLI::IsMember(EmulatedDrives()))
-      ->excludes(graph);
+  AddDrives(benchmark, &subject->drives)->excludes(graph);
   AddList(benchmark, "--part", &arguments->parts, "only this part of the set, repeatable", "PART");
   benchmark->add_flag("--quick", arguments->quick,
                       "a few of the same points: minutes; --resume without it goes on to all");
   benchmark->add_option("--out", session->out,
                         "folder of the results, new or empty; default: a dated one under runs/");
-  benchmark->add_option("--jobs", session->jobs, "runs at a time; default: the processor's cores")
-      ->check(CLI::Range(1, 1024));
+  AddJobs(benchmark, &session->jobs, "runs at a time");
   CLI::Option* const resume =
       benchmark->add_flag("--resume", session->resume, "go on with the benchmark in --out");
   resume->needs(benchmark->get_option("--out"));
@@ -212,8 +205,6 @@ void AddBenchmarkCommand(CLI::App* app, Command* command) {
       "what is measured and why.\nExit code: 0 measured, whatever fell; 1 interrupted, or a run "
       "could not be made; 2 wrong usage or configuration.\nExample: poise benchmark --quick --part "
       "push_double");
-  benchmark->callback(
-      [arguments, command] { *command = [arguments] { return RunBenchmark(*arguments); }; });
 }
 
 }  // namespace poise

@@ -146,9 +146,9 @@ int Bits(const BitsArguments& arguments) {
 }  // namespace
 
 void AddBitsCommand(CLI::App* app, Command* command) {
-  auto arguments = std::make_shared<BitsArguments>();
-  CLI::App* bits = app->add_subcommand(
-      "bits", "run what deploy/bits has a record of and compare every message, bit for bit");
+  const auto [bits, arguments] = AddCommand<BitsArguments>(
+      app, command, "bits",
+      "run what deploy/bits has a record of and compare every message, bit for bit", Bits);
   bits->add_option("run", arguments->names, "of the record; default: all");
   bits->add_flag("--processes", arguments->processes, "as processes; default: in one process");
   bits->add_flag("--hosted", arguments->hosted,
@@ -162,7 +162,6 @@ void AddBitsCommand(CLI::App* app, Command* command) {
       "Exit code: 0 the same bits; 1 other bits; 3 other bits, and this build has another "
       "instruction set, compiler or library than the record's.\nExample: "
       "poise bits push_double_support");
-  bits->callback([arguments, command] { *command = [arguments] { return Bits(*arguments); }; });
 }
 
 }  // namespace poise

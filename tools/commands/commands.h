@@ -3,6 +3,9 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <memory>
+#include <string>
+#include <utility>
 
 namespace poise {
 
@@ -14,6 +17,34 @@ inline constexpr int kExitMachine = 3;
 
 /// What the parsed command line asks for; returns the exit code.
 using Command = std::function<int()>;
+
+/// Adds a command to `parent`. Parsing it sets `command` to a call of `run` with its options, which
+/// are returned beside it and live as long.
+template <class Options, class Run>
+std::pair<CLI::App*, Options*> AddCommand(CLI::App* parent, Command* command,
+                                          const std::string& name, const std::string& description,
+                                          Run run) {
+  auto options = std::make_shared<Options>();
+  CLI::App* const app = parent->add_subcommand(name, description);
+  app->callback([=] { *command = [=] { return run(*options); }; });
+  return {app, options.get()};
+}
+
+/// Adds one without options.
+inline CLI::App* AddCommand(CLI::App* parent, Command* command, const std::string& name,
+                            const std::string& description, const Command& run) {
+  CLI::App* const app = parent->add_subcommand(name, description);
+  app->callback([=] { *command = run; });
+  return app;
+}
+
+/// Adds a command that only has commands below it.
+inline CLI::App* AddGroup(CLI::App* parent, const std::string& name,
+                          const std::string& description) {
+  CLI::App* const app = parent->add_subcommand(name, description);
+  app->require_subcommand(1);
+  return app;
+}
 
 /// Each adds its subcommand; parsing it sets `command`, which may throw ConfigError (usage),
 /// anything else (failure).

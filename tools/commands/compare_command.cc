@@ -13,9 +13,13 @@ namespace {
 
 using logging::ForTerminal;
 
-int CompareRuns(const std::string& first, const std::string& second) {
-  const std::string first_log = FindLog(first).string();
-  const std::string second_log = FindLog(second).string();
+struct ComparedRuns {
+  std::string first, second;
+};
+
+int CompareRuns(const ComparedRuns& runs) {
+  const std::string first_log = FindLog(runs.first).string();
+  const std::string second_log = FindLog(runs.second).string();
   WarnOfRunInfo(first_log);
   WarnOfRunInfo(second_log);
   const logging::LogComparison result = logging::CompareLogs(first_log, second_log);
@@ -37,18 +41,12 @@ int CompareRuns(const std::string& first, const std::string& second) {
 }  // namespace
 
 void AddCompareCommand(CLI::App* app, Command* command) {
-  struct Runs {
-    std::string first;
-    std::string second;
-  };
-  auto runs = std::make_shared<Runs>();
-  CLI::App* compare = app->add_subcommand(
-      "compare", "compare two runs' messages bit for bit (exit code 1 when they differ)");
+  const auto [compare, runs] = AddCommand<ComparedRuns>(
+      app, command, "compare",
+      "compare two runs' messages bit for bit (exit code 1 when they differ)", CompareRuns);
   compare->add_option("first", runs->first, "folder of a run or a log")->required();
   compare->add_option("second", runs->second, "folder of a run or a log")->required();
   SetExample(compare, "poise compare runs/before runs/after");
-  compare->callback(
-      [runs, command] { *command = [runs] { return CompareRuns(runs->first, runs->second); }; });
 }
 
 }  // namespace poise

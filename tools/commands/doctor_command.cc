@@ -171,9 +171,8 @@ int Doctor() {
     const char* const mark = finding.level == Level::kGood   ? "ok  "
                              : finding.level == Level::kNote ? "note"
                                                              : "BAD ";
-    const std::string line = fmt::format("{}  {:<15} {}{}{}", mark, finding.what, finding.found,
-                                         finding.advice.empty() ? "" : "; ", finding.advice);
-    fmt::print("{}\n", Wrapped(line, ScreenStyle().columns, 22));
+    fmt::print("{}", ScreenLines(22, "{}  {:<15} {}{}{}", mark, finding.what, finding.found,
+                                 finding.advice.empty() ? "" : "; ", finding.advice));
     bad = bad || finding.level == Level::kBad;
   }
   return bad ? kExitFailed : kExitOk;
@@ -182,10 +181,9 @@ int Doctor() {
 }  // namespace
 
 void AddDoctorCommand(CLI::App* app, Command* command) {
-  CLI::App* doctor =
-      app->add_subcommand("doctor", "check network and privileges of this machine, with advice");
+  CLI::App* const doctor = AddCommand(
+      app, command, "doctor", "check network and privileges of this machine, with advice", Doctor);
   SetExample(doctor, "poise doctor");
-  doctor->callback([command] { *command = Doctor; });
 }
 
 }  // namespace poise

@@ -146,13 +146,12 @@ int Scan(const DrivesOptions& options) {
 }  // namespace
 
 void AddDrivesCommand(CLI::App* app, Command* command) {
-  auto options = std::make_shared<DrivesOptions>();
-  CLI::App* drives = app->add_subcommand("drives", "EtherCAT drives without a robot");
-  drives->require_subcommand(1);
+  CLI::App* const drives = AddGroup(app, "drives", "EtherCAT drives without a robot");
   const std::string link_help = "udp, udp:PORT, udp:ADDRESS:PORT, or raw:INTERFACE (CAP_NET_RAW)";
 
-  CLI::App* emulate = drives->add_subcommand(
-      "emulate", "an emulated chain of drives, a rotor on each, for any master to try");
+  const auto [emulate, options] = AddCommand<DrivesOptions>(
+      drives, command, "emulate",
+      "an emulated chain of drives, a rotor on each, for any master to try", Emulate);
   emulate->add_option("--link", options->link, link_help)->capture_default_str();
   emulate->add_option("--count", options->count, "drives")
       ->capture_default_str()
@@ -169,15 +168,14 @@ void AddDrivesCommand(CLI::App* app, Command* command) {
       ->capture_default_str()
       ->check(Within("in [0, 1000000]", [](double s) { return s >= 0 && s <= 1e6; }));
   SetExample(emulate, "poise drives emulate --count 6 --duration 60");
-  emulate->callback([options, command] { *command = [options] { return Emulate(*options); }; });
 
-  CLI::App* scan = drives->add_subcommand(
-      "scan",
-      "read a chain and write it as a configuration; slaves go to PRE-OP and back, no torque");
-  scan->add_option("--link", options->link, link_help)->capture_default_str();
-  scan->add_option("--out", options->out, "file; default: standard output");
+  const auto [scan, scan_options] = AddCommand<DrivesOptions>(
+      drives, command, "scan",
+      "read a chain and write it as a configuration; slaves go to PRE-OP and back, no torque",
+      Scan);
+  scan->add_option("--link", scan_options->link, link_help)->capture_default_str();
+  scan->add_option("--out", scan_options->out, "file; default: standard output");
   SetExample(scan, "poise drives scan --out chain.pbtxt");
-  scan->callback([options, command] { *command = [options] { return Scan(*options); }; });
 }
 
 }  // namespace poise

@@ -229,9 +229,9 @@ int Echo(const EchoOptions& options) {
 }  // namespace
 
 void AddEchoCommand(CLI::App* app, Command* command) {
-  auto options = std::make_shared<EchoOptions>();
-  CLI::App* echo = app->add_subcommand(
-      "echo", "decoded messages of a channel, of a run in progress or from a log");
+  const auto [echo, options] = AddCommand<EchoOptions>(
+      app, command, "echo", "decoded messages of a channel, of a run in progress or from a log",
+      Echo);
   echo->add_option("channel", options->channel, "e.g. ROBOT_STATE, HEALTH_SIM")->required();
   echo->add_option(
       "field", options->fields,
@@ -248,7 +248,6 @@ void AddEchoCommand(CLI::App* app, Command* command) {
       ->check(Within("in (0, 1e6]", [](double rate) { return rate > 0 && rate <= 1e6; }));
   echo->add_flag("--csv", options->csv, "comma-separated values, with a line of names first");
   SetExample(echo, "poise echo ROBOT_STATE joint_position --log runs/latest --count 3");
-  echo->callback([options, command] { *command = [options] { return Echo(*options); }; });
 }
 
 }  // namespace poise

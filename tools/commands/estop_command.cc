@@ -121,15 +121,22 @@ std::vector<Line> AllLines(OperatorAct::Kind kind, int* exit_code) {
   return lines;
 }
 
-int Estop(const std::string& run, bool reset) {
-  const auto kind = reset ? OperatorAct::Kind::kReset : OperatorAct::Kind::kStop;
+struct EstopOptions {
+  std::string run;
+  bool reset = false;
+};
+
+int Estop(const EstopOptions& options) {
+  const auto kind = options.reset ? OperatorAct::Kind::kReset : OperatorAct::Kind::kStop;
   int exit_code = kExitOk;
   std::vector<Line> lines;
-  if (run.empty()) {
+  if (options.run.empty()) {
     lines = AllLines(kind, &exit_code);
   } else {
     // It asks for none of several that are called so: a stop must not wait for an answer.
-    for (const std::filesystem::path& dir : RunsNamed(run)) lines.push_back(LineTo(dir, kind));
+    for (const std::filesystem::path& dir : RunsNamed(options.run)) {
+      lines.push_back(LineTo(dir, kind));
+    }
   }
   const int done = DoAll(lines, kind);
   return done != kExitOk ? done : exit_code;
@@ -138,17 +145,14 @@ int Estop(const std::string& run, bool reset) {
 }  // namespace
 
 void AddEstopCommand(CLI::App* app, Command* command) {
-  auto run = std::make_shared<std::string>();
-  auto reset = std::make_shared<bool>(false);
-  CLI::App* estop = app->add_subcommand(
-      "estop", "emergency stop of your runs that go on, or of one run (latched)");
-  estop->add_option("run", *run,
+  const auto [estop, options] = AddCommand<EstopOptions>(
+      app, command, "estop", "emergency stop of your runs that go on, or of one run (latched)",
+      Estop);
+  estop->add_option("run", options->run,
                     "folder or name of the run, also another user's; default: every run of yours");
-  estop->add_flag("--reset", *reset,
+  estop->add_flag("--reset", options->reset,
                   "end a stop: only once the motors are at rest and no torque is commanded");
   SetExample(estop, "poise estop runs/latest");
-  estop->callback(
-      [run, reset, command] { *command = [run, reset] { return Estop(*run, *reset); }; });
 }
 
 }  // namespace poise

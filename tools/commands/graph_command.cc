@@ -80,12 +80,16 @@ void ShowRun(const RunSpec& spec) {
     tick += fmt::format(" {}.{}", component.name,
                         component.wiring.stages()[static_cast<size_t>(ref.stage)].name);
   }
-  fmt::print("{}\n", Wrapped(tick, ScreenStyle().columns, 2));
+  fmt::print("{}", ScreenLines(2, "{}", tick));
 }
 
-int CheckByName(const std::string& name) {
+struct GraphOptions {
+  std::string name = "push_double_support";
+};
+
+int CheckByName(const GraphOptions& options) {
   const std::string file =
-      FindFileOfKinds({"scenarios", "graphs"}, name, fs::current_path()).string();
+      FindFileOfKinds({"scenarios", "graphs"}, options.name, fs::current_path()).string();
   if (!IsScenario(file)) {
     CheckGraphFile(file);
     fmt::print(
@@ -135,15 +139,13 @@ int CheckByName(const std::string& name) {
 }  // namespace
 
 void AddGraphCommand(CLI::App* app, Command* command) {
-  auto name = std::make_shared<std::string>("push_double_support");
-  CLI::App* graph = app->add_subcommand("graph", "look at process graphs");
-  graph->require_subcommand(1);
-  CLI::App* check = graph->add_subcommand(
-      "check", "check a graph, or a scenario with its graph, robot and configurations");
-  check->add_option("name", *name, "graph or scenario: a name or a .pbtxt file")
+  CLI::App* const graph = AddGroup(app, "graph", "look at process graphs");
+  const auto [check, options] = AddCommand<GraphOptions>(
+      graph, command, "check",
+      "check a graph, or a scenario with its graph, robot and configurations", CheckByName);
+  check->add_option("name", options->name, "graph or scenario: a name or a .pbtxt file")
       ->capture_default_str();
   SetExample(check, "poise graph check push_double_support");
-  check->callback([name, command] { *command = [name] { return CheckByName(*name); }; });
 }
 
 }  // namespace poise

@@ -108,7 +108,9 @@ std::string Format(const std::vector<Rungs>& rungs) {
   return FormatColumns(table);
 }
 
-int RunLadder(SweepArguments arguments, const SessionOptions& options) {
+int RunLadder(const SweepOptions& given) {
+  SweepArguments arguments = given.arguments;
+  const SessionOptions& options = given.session;
   if (!options.range.empty() || !options.part.empty()) {
     throw ConfigError(options.range.empty() ? "--part" : "--range",
                       "is not for a ladder, whose table has all directions");
@@ -155,11 +157,10 @@ int RunLadder(SweepArguments arguments, const SessionOptions& options) {
 }  // namespace
 
 void AddLadderCommand(CLI::App* app, Command* command) {
-  auto arguments = std::make_shared<SweepArguments>();
-  auto session = std::make_shared<SessionOptions>();
-  CLI::App* ladder = app->add_subcommand(
-      "ladder", "how much of a push each rung survives, from the pendulum's bound to the robot");
-  AddSweepOptions(ladder, arguments.get(), session.get());
+  const auto [ladder, options] = AddCommand<SweepOptions>(
+      app, command, "ladder",
+      "how much of a push each rung survives, from the pendulum's bound to the robot", RunLadder);
+  AddSweepOptions(ladder, options);
   ladder->footer(
       "Rungs, N·s by direction of the push: the bound of as many steps as wanted from reach, "
       "soles and the least swing, m w (r + sum l_k e^(-w t_k)); what the planner catches on a "
@@ -168,9 +169,6 @@ void AddLadderCommand(CLI::App* app, Command* command) {
       "push_ladder, some 180 runs a rung; a limit of its own pushes once, by "
       "scaled_impulse. Exit code: as poise sweep.\n"
       "Example: poise ladder --set robot=heron/heron --world mujoco");
-  ladder->callback([arguments, session, command] {
-    *command = [arguments, session] { return RunLadder(*arguments, *session); };
-  });
 }
 
 }  // namespace poise

@@ -9,8 +9,9 @@
 namespace poise {
 namespace {
 
-int RunLimit(const SweepArguments& arguments, const SessionOptions& options) {
-  const SweepDefinition definition(arguments, /*limit=*/true);
+int RunLimit(const SweepOptions& given) {
+  const SessionOptions& options = given.session;
+  const SweepDefinition definition(given.arguments, /*limit=*/true);
   const Limit& limit = definition.sweep().limit();
   const auto [first, end] = SelectedRuns(options, definition.points().size());
   SweepSession session(definition, kKindLimit, options);
@@ -31,19 +32,18 @@ int RunLimit(const SweepArguments& arguments, const SessionOptions& options) {
 }  // namespace
 
 void AddLimitCommand(CLI::App* app, Command* command) {
-  auto arguments = std::make_shared<SweepArguments>();
-  auto session = std::make_shared<SessionOptions>();
-  auto given = std::make_shared<Limit>();
-  CLI::App* limit = app->add_subcommand(
-      "limit", "find the largest survivable value of a field, for each point of a grid");
-  AddSweepOptions(limit, arguments.get(), session.get());
+  const auto [limit, options] = AddCommand<SweepOptions>(
+      app, command, "limit",
+      "find the largest survivable value of a field, for each point of a grid", RunLimit);
+  AddSweepOptions(limit, options);
+  Limit* const given = &options->arguments.limit.emplace();
   const auto number = [&](const char* flag, void (Limit::*set)(double), const char* text) {
     limit->add_option_function<double>(
-        flag, [given, set](double v) { ((*given).*set)(v); }, text);
+        flag, [given, set](double v) { (given->*set)(v); }, text);
   };
   const auto word = [&](const char* flag, const char* text, auto set) {
     limit->add_option_function<std::string>(
-        flag, [given, set](const std::string& v) { set(given.get(), v); }, text);
+        flag, [given, set](const std::string& v) { set(given, v); }, text);
   };
   word("--field", "the scenario's field whose limit is sought; replaces the file's",
        [](Limit* l, const std::string& v) { l->set_field(v); });
@@ -66,12 +66,6 @@ void AddLimitCommand(CLI::App* app, Command* command) {
       "one step catches: docs/reference/sweeps.md has the formulas.\n"
       "poise sweep merge joins the folders of --range or --part. Exit code: as poise sweep.\n"
       "Example: poise limit push_double_support --field 'sim.push[0].peak' --min 150 --max 350");
-  limit->callback([arguments, session, given, command] {
-    *command = [arguments, session, given] {
-      arguments->limit = *given;
-      return RunLimit(*arguments, *session);
-    };
-  });
 }
 
 }  // namespace poise

@@ -52,8 +52,7 @@ void ListFiles(const std::string& kind,
     } catch (const ConfigError& error) {
       text = error.what();
     }
-    fmt::print("{}\n",
-               Wrapped(fmt::format("  {:<{}}  {}", name, width, text), ScreenStyle().columns, 6));
+    fmt::print("{}", ScreenLines(6, "  {:<{}}  {}", name, width, text));
   }
 }
 
@@ -131,11 +130,10 @@ int ListMetricsAsMarkdown() {
 /// One metric, or those whose name holds a word, with what each is computed from.
 int ListMetric(const std::string& name) {
   const auto print = [](const logging::Metric& metric) {
-    const int columns = ScreenStyle().columns;
-    fmt::print("{}{}\n{}\n", metric.name, metric.unit.empty() ? "" : ", " + metric.unit,
-               Wrapped(fmt::format("  {}", metric.description), columns, 2));
+    fmt::print("{}{}\n{}", metric.name, metric.unit.empty() ? "" : ", " + metric.unit,
+               ScreenLines(2, "  {}", metric.description));
     for (const std::string& need : logging::TellNeeds(metric)) {
-      fmt::print("{}\n", Wrapped(fmt::format("  from {}", need), columns, 7));
+      fmt::print("{}", ScreenLines(7, "  from {}", need));
     }
   };
   if (const logging::Metric* const metric = logging::FindMetric(name)) {
@@ -197,16 +195,12 @@ void PrintMetrics() {
     unit = std::max(unit, DisplayWidth(metric.unit));
   }
   const int indent = 2 + name + 2 + unit + 2;
-  const int columns = ScreenStyle().columns;
+  const bool room = ScreenStyle().columns - indent >= kLeastRoom;
   for (const logging::Metric& metric : logging::Metrics()) {
-    const std::string line =
-        columns - indent >= kLeastRoom
-            ? Wrapped(fmt::format("  {:<{}}  {:<{}}  {}", metric.name, name, metric.unit, unit,
-                                  metric.description),
-                      columns, indent)
-            : fmt::format("  {}  {}\n{}", metric.name, metric.unit,
-                          Wrapped(fmt::format("      {}", metric.description), columns, 6));
-    fmt::print("{}\n", line);
+    fmt::print("{}", room ? ScreenLines(indent, "  {:<{}}  {:<{}}  {}", metric.name, name,
+                                        metric.unit, unit, metric.description)
+                          : fmt::format("  {}  {}\n", metric.name, metric.unit) +
+                                ScreenLines(6, "      {}", metric.description));
   }
 }
 
@@ -225,9 +219,8 @@ int ListComponent(const std::string& name) {
     const char* const when = kind == InputKind::kPreviousTick ? ", of the tick before"
                              : kind == InputKind::kLatest     ? ", the latest"
                                                               : "";
-    fmt::print("{}\n", Wrapped(fmt::format("  {:<7} {:<18} {}{}{}{}", input ? "input" : "output",
-                                           port, carried, when, where.empty() ? "" : ", ", where),
-                               ScreenStyle().columns, 29));
+    fmt::print("{}", ScreenLines(29, "  {:<7} {:<18} {}{}{}{}", input ? "input" : "output", port,
+                                 carried, when, where.empty() ? "" : ", ", where));
   };
   for (const bool input : {true, false}) {
     for (const PortType& port : type->ports) {
@@ -328,8 +321,7 @@ int List(const ListRequest& request) {
       const std::string fields = sections.empty() ? ""
                                                   : fmt::format(" (the scenario's fields {})",
                                                                 fmt::join(sections, " and "));
-      fmt::print("{}\n", Wrapped(fmt::format("  {:<24}{}{}", type, entry.summary, fields),
-                                 ScreenStyle().columns, 26));
+      fmt::print("{}", ScreenLines(26, "  {:<24}{}{}", type, entry.summary, fields));
     }
   }
   if (wanted("runs") && !request.json) ListRuns();
@@ -349,8 +341,8 @@ int List(const ListRequest& request) {
 }  // namespace
 
 void AddListCommand(CLI::App* app, Command* command) {
-  auto request = std::make_shared<ListRequest>();
-  CLI::App* list = app->add_subcommand("list", "what there is to use, and what each field means");
+  const auto [list, request] = AddCommand<ListRequest>(
+      app, command, "list", "what there is to use, and what each field means", List);
   list->add_option(
           "what", request->what,
           "scenarios, sweeps, robots, graphs, components, runs (that go on, and those that "
@@ -370,7 +362,6 @@ void AddListCommand(CLI::App* app, Command* command) {
                  "of runs: only the folders of those that can be listened to, for scripts");
   list->add_flag("--json", request->json, "of runs: those below runs/, for programs");
   SetExample(list, "poise list fields sim.push");
-  list->callback([request, command] { *command = [request] { return List(*request); }; });
 }
 
 }  // namespace poise

@@ -79,8 +79,12 @@ void PrintRun(const logging::LogSurvey& survey) {
   }
 }
 
-int Info(const std::string& run) {
-  const std::string log = FindLog(run).string();
+struct LogOptions {
+  std::string run;
+};
+
+int Info(const LogOptions& options) {
+  const std::string log = FindLog(options.run).string();
   const logging::LogSurvey survey = logging::SurveyLog(log);
   if (survey.events == 0) {
     throw ConfigError(fmt::format("{}: is no event log: it holds no event", log));
@@ -102,10 +106,14 @@ int Info(const std::string& run) {
   return kExitOk;
 }
 
-int Check(const std::string& run, bool all) {
-  const std::string log = FindLog(run).string();
+struct LogCheckOptions : LogOptions {
+  bool all = false;
+};
+
+int CheckLog(const LogCheckOptions& options) {
+  const std::string log = FindLog(options.run).string();
   const logging::LogSurvey survey = logging::SurveyLog(log);
-  std::vector<std::string> problems = survey.Problems(all ? 0 : kPlaces);
+  std::vector<std::string> problems = survey.Problems(options.all ? 0 : kPlaces);
   const auto altered = logging::CheckSums(log);
   if (altered) problems.insert(problems.end(), altered->begin(), altered->end());
   for (const std::string& problem : problems) fmt::print("{}\n", problem);
@@ -124,8 +132,7 @@ int Check(const std::string& run, bool all) {
   return problems.empty() ? kExitOk : kExitFailed;
 }
 
-struct CutOptions {
-  std::string run;
+struct CutOptions : LogOptions {
   std::string out;
   bool force = false;
   std::optional<double> from;
@@ -174,8 +181,7 @@ int Cut(const CutOptions& options) {
   return result.refused > 0 ? kExitFailed : kExitOk;
 }
 
-struct ExportOptions {
-  std::string run;
+struct ExportOptions : LogOptions {
   bool force = false;
   std::string csv;
   std::string merged;
@@ -244,8 +250,7 @@ int Export(const ExportOptions& options) {
   return whole ? kExitOk : kExitFailed;
 }
 
-struct PackOptions {
-  std::string run;
+struct PackOptions : LogOptions {
   bool keep = false;
 };
 
@@ -269,105 +274,76 @@ int Pack(const PackOptions& options) {
   return kExitOk;
 }
 
-int Unpack(const std::string& run) {
+int Unpack(const LogOptions& options) {
   // FindLog makes a packed log again.
-  fmt::print("{}\n", FindLog(run).string());
+  fmt::print("{}\n", FindLog(options.run).string());
   return kExitOk;
 }
 
-CLI::Option* AddRun(CLI::App* app, std::string* run) {
-  return app->add_option("run", *run, "folder of a run or a log; default: the latest run");
-}
-
-void AddInfo(CLI::App* log, Command* command) {
-  auto run = std::make_shared<std::string>();
-  CLI::App* info = log->add_subcommand("info", "what run it is of, and its channels");
-  AddRun(info, run.get());
-  SetExample(info, "poise log info runs/latest");
-  info->callback([run, command] { *command = [run] { return Info(*run); }; });
-}
-
-void AddCheck(CLI::App* log, Command* command) {
-  struct Options {
-    std::string run;
-    bool all = false;
-  };
-  auto options = std::make_shared<Options>();
-  CLI::App* check = log->add_subcommand(
-      "check",
-      "whether it is whole: damage by byte, missing, double, disordered and refused messages by "
-      "channel and tick (exit code 1 when anything is wrong)");
-  AddRun(check, &options->run);
-  check->add_flag("--all", options->all,
-                  fmt::format("name every place, not only the first {} of a kind", kPlaces));
-  SetExample(check, "poise log check runs/latest --all");
-  check->callback(
-      [options, command] { *command = [options] { return Check(options->run, options->all); }; });
-}
-
-void AddCut(CLI::App* log, Command* command) {
-  auto options = std::make_shared<CutOptions>();
-  CLI::App* cut = log->add_subcommand(
-      "cut", "copy a part into a new log, which keeps RUN_INFO and is a run's log like the whole");
-  AddRun(cut, &options->run);
-  const auto time = Within("a time of -1e9 to 1e9 s", [](double s) { return std::abs(s) <= 1e9; });
-  cut->add_option("--out", options->out, "log to write")->required();
-  cut->add_flag("--force", options->force, "replace a file of that name");
-  CLI::Option* from =
-      cut->add_option("--from", options->from, "first time, s of the scenario")->check(time);
-  CLI::Option* to = cut->add_option("--to", options->to, "last time, s")->check(time);
-  const CLI::Range ticks(int64_t{0}, INT64_MAX - 1);
-  cut->add_option("--first-tick", options->first_tick, "first tick")->check(ticks)->excludes(from);
-  cut->add_option("--last-tick", options->last_tick, "last tick")->check(ticks)->excludes(to);
-  AddList(cut, "--channel", &options->channels,
-          "channel to keep, e.g. --channel ROBOT_STATE --channel HEALTH_SIM; default: "
-          "all");
-  SetExample(cut, "poise log cut runs/latest --from 1 --to 1.2 --out part.lcm");
-  cut->callback([options, command] { *command = [options] { return Cut(*options); }; });
-}
-
-void AddExport(CLI::App* log, Command* command) {
-  auto options = std::make_shared<ExportOptions>();
-  CLI::App* app = log->add_subcommand(
-      "export", "write it as CSV (PlotJuggler, spreadsheets) or MCAP (Foxglove, PlotJuggler)");
-  AddRun(app, &options->run);
-  app->add_option("--csv", options->csv, "folder for one CSV file a channel, a row a message");
-  app->add_option("--merged", options->merged, "one wide CSV file, a row a tick");
-  app->add_option("--mcap", options->mcap,
-                  "MCAP file: the messages as Protobuf, and what shows the robot in Foxglove");
-  app->add_flag("--force", options->force, "replace files of these names");
-  SetExample(app, "poise log export runs/latest --csv csv --mcap run.mcap");
-  app->callback([options, command] { *command = [options] { return Export(*options); }; });
-}
-
-void AddPack(CLI::App* log, Command* command) {
-  auto options = std::make_shared<PackOptions>();
-  CLI::App* pack = log->add_subcommand(
-      "pack",
-      "put a small file in the place of a log that this build makes again, byte for byte: a run in "
-      "lockstep without an operator's messages. It is made again first, to see that it is so");
-  AddRun(pack, &options->run);
-  pack->add_flag("--keep", options->keep, "leave the log");
-  SetExample(pack, "poise log pack runs/latest");
-  pack->callback([options, command] { *command = [options] { return Pack(*options); }; });
-  auto run = std::make_shared<std::string>();
-  CLI::App* unpack = log->add_subcommand(
-      "unpack", "make a packed log again; every command that reads a run's log does so too");
-  AddRun(unpack, run.get());
-  SetExample(unpack, "poise log unpack runs/latest");
-  unpack->callback([run, command] { *command = [run] { return Unpack(*run); }; });
+/// AddCommand of one that takes a log, with an example of its use.
+template <class Options, class Run>
+std::pair<CLI::App*, Options*> AddOfLog(CLI::App* log, Command* command, const std::string& name,
+                                        const std::string& description, Run run,
+                                        const std::string& example) {
+  const auto [app, options] = AddCommand<Options>(log, command, name, description, run);
+  app->add_option("run", options->run, "folder of a run or a log; default: the latest run");
+  SetExample(app, fmt::format("poise log {} runs/latest{}", name, example));
+  return {app, options};
 }
 
 }  // namespace
 
 void AddLogCommand(CLI::App* app, Command* command) {
-  CLI::App* log = app->add_subcommand("log", "inspect, check, cut, export and pack a run's log");
-  log->require_subcommand(1);
-  AddInfo(log, command);
-  AddCheck(log, command);
-  AddCut(log, command);
-  AddExport(log, command);
-  AddPack(log, command);
+  CLI::App* const log = AddGroup(app, "log", "inspect, check, cut, export and pack a run's log");
+  AddOfLog<LogOptions>(log, command, "info", "what run it is of, and its channels", Info, "");
+
+  const auto [check, check_options] = AddOfLog<LogCheckOptions>(
+      log, command, "check",
+      "whether it is whole: damage by byte, missing, double, disordered and refused messages by "
+      "channel and tick (exit code 1 when anything is wrong)",
+      CheckLog, " --all");
+  check->add_flag("--all", check_options->all,
+                  fmt::format("name every place, not only the first {} of a kind", kPlaces));
+
+  const auto [cut, cut_options] = AddOfLog<CutOptions>(
+      log, command, "cut",
+      "copy a part into a new log, which keeps RUN_INFO and is a run's log like the whole", Cut,
+      " --from 1 --to 1.2 --out part.lcm");
+  const auto time = Within("a time of -1e9 to 1e9 s", [](double s) { return std::abs(s) <= 1e9; });
+  cut->add_option("--out", cut_options->out, "log to write")->required();
+  cut->add_flag("--force", cut_options->force, "replace a file of that name");
+  CLI::Option* from =
+      cut->add_option("--from", cut_options->from, "first time, s of the scenario")->check(time);
+  CLI::Option* to = cut->add_option("--to", cut_options->to, "last time, s")->check(time);
+  const CLI::Range ticks(int64_t{0}, INT64_MAX - 1);
+  cut->add_option("--first-tick", cut_options->first_tick, "first tick")
+      ->check(ticks)
+      ->excludes(from);
+  cut->add_option("--last-tick", cut_options->last_tick, "last tick")->check(ticks)->excludes(to);
+  AddList(cut, "--channel", &cut_options->channels,
+          "channel to keep, e.g. --channel ROBOT_STATE --channel HEALTH_SIM; default: "
+          "all");
+
+  const auto [to_files, export_options] = AddOfLog<ExportOptions>(
+      log, command, "export",
+      "write it as CSV (PlotJuggler, spreadsheets) or MCAP (Foxglove, PlotJuggler)", Export,
+      " --csv csv --mcap run.mcap");
+  to_files->add_option("--csv", export_options->csv,
+                       "folder for one CSV file a channel, a row a message");
+  to_files->add_option("--merged", export_options->merged, "one wide CSV file, a row a tick");
+  to_files->add_option("--mcap", export_options->mcap,
+                       "MCAP file: the messages as Protobuf, and what shows the robot in Foxglove");
+  to_files->add_flag("--force", export_options->force, "replace files of these names");
+
+  const auto [pack, pack_options] = AddOfLog<PackOptions>(
+      log, command, "pack",
+      "put a small file in the place of a log that this build makes again, byte for byte: a run in "
+      "lockstep without an operator's messages. It is made again first, to see that it is so",
+      Pack, "");
+  pack->add_flag("--keep", pack_options->keep, "leave the log");
+  AddOfLog<LogOptions>(log, command, "unpack",
+                       "make a packed log again; every command that reads a run's log does so too",
+                       Unpack, "");
 }
 
 }  // namespace poise

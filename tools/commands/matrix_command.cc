@@ -24,6 +24,7 @@
 #include "tools/run/several_runs.h"
 #include "tools/scenario/ablations.h"
 #include "tools/scenario/run_setup.h"
+#include "tools/sweep/sweep_session.h"
 
 namespace poise {
 namespace {
@@ -39,7 +40,7 @@ struct MatrixOptions {
   std::string world;  ///< see RunChanges
   std::string out;
   bool force = false;
-  int jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  int jobs = 1;
 };
 
 /// A cell and how it is run.
@@ -204,7 +205,7 @@ int Matrix(const MatrixOptions& options) {
   for (const Job& job : jobs) sizes.Add(job.log_size);
   const std::string space =
       CheckSpace(options.out.empty() ? RunsDir() : fs::path(options.out), sizes, options.force);
-  if (!space.empty()) fmt::print("{}\n", Wrapped(space, ScreenStyle().columns, 2));
+  if (!space.empty()) fmt::print("{}", ScreenLines(2, "{}", space));
   const RunDir matrix = MakeRunDir(options.out, "matrix", options.force);
   const fs::path& folder = matrix.path();
   CatchStopSignals();
@@ -251,11 +252,11 @@ int Matrix(const MatrixOptions& options) {
 }  // namespace
 
 void AddMatrixCommand(CLI::App* app, Command* command) {
-  auto options = std::make_shared<MatrixOptions>();
   std::vector<std::string> names;
   for (const Ablation& ablation : Ablations()) names.push_back(ablation.name);
-  CLI::App* matrix = app->add_subcommand(
-      "matrix", "run experiments with and without each part of the controller, and compare");
+  const auto [matrix, options] = AddCommand<MatrixOptions>(
+      app, command, "matrix",
+      "run experiments with and without each part of the controller, and compare", Matrix);
   matrix
       ->add_option("scenario", options->scenarios,
                    "names or .pbtxt files; all: every experiment of the paper")
@@ -263,11 +264,8 @@ void AddMatrixCommand(CLI::App* app, Command* command) {
   AddList(matrix, "--ablation", &options->ablations,
           "column to run, repeatable; default: all; variants run as they are")
       ->check(CLI::IsMember(names));
-  matrix->add_option("--world", options->world,
-                     "engine of the simulated robot: ode or mujoco; default: the scenarios'");
-  matrix->add_option("--jobs", options->jobs, "runs at a time; default: the processor's cores")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
+  AddWorld(matrix, &options->world, "the scenarios'");
+  AddJobs(matrix, &options->jobs, "runs at a time");
   matrix->add_option("--out", options->out,
                      "folder for a run's folder each, matrix.csv and charts.html; default: a dated "
                      "one under runs/");
@@ -283,7 +281,6 @@ void AddMatrixCommand(CLI::App* app, Command* command) {
       "an experiment (or a variant that has checks of its own) fails without ablation. 2 wrong "
       "usage or configuration.\nExample: poise matrix push_double_support --ablation "
       "without_balancing");
-  matrix->callback([options, command] { *command = [options] { return Matrix(*options); }; });
 }
 
 }  // namespace poise

@@ -62,17 +62,14 @@ int NewScenario(const NewOptions& options) {
 }  // namespace
 
 void AddNewCommand(CLI::App* app, Command* command) {
-  CLI::App* make = app->add_subcommand("new", "write a file of your own to begin with");
-  make->require_subcommand(1);
-  auto options = std::make_shared<NewOptions>();
-  CLI::App* scenario =
-      make->add_subcommand("scenario", "a commented scenario, NAME.pbtxt in the current folder");
+  CLI::App* const make = AddGroup(app, "new", "write a file of your own to begin with");
+  const auto [scenario, options] =
+      AddCommand<NewOptions>(make, command, "scenario",
+                             "a commented scenario, NAME.pbtxt in the current folder", NewScenario);
   scenario->add_option("name", options->name, "letters, digits, _ and -")->required();
   scenario->add_option("--from", options->from,
                        "a copy of this scenario, a name or a .pbtxt file (poise list scenarios)");
   SetExample(scenario, "poise new scenario my_push --from push_double_support");
-  scenario->callback(
-      [options, command] { *command = [options] { return NewScenario(*options); }; });
 }
 
 }  // namespace poise

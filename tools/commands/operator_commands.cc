@@ -202,14 +202,31 @@ int PushRobot(const RobotPushOptions& options) {
                fmt::format("push of {:.4g} N for {:.4g} s", push.force.norm(), push.duration));
 }
 
+struct RobotStepOptions {
+  std::string run, foot;
+  bool next_phase = false, together = false;
+};
+
+int StepInPlace(const RobotStepOptions& options) {
+  const ActedRun run = FindActedRun(options.run, "poise step");
+  if (options.together) {
+    const int code = DoAct(run, ActOf(ActKind::kStopWalking), "feet together");
+    // The planner's answer does not tell whether there is anything to do.
+    if (code == kExitOk) fmt::print("feet that stand side by side already stay\n");
+    return code;
+  }
+  return options.next_phase ? DoAct(run, ActOf(ActKind::kNextPhase), "next phase")
+                            : DoAct(run, ActOf(ActKind::kStep, options.foot), "step");
+}
+
 struct RobotWalkOptions {
   std::string run, velocity;
-  double turn = 0;  // rad/s
+  std::optional<double> turn;  // rad/s
   bool stop = false;
 };
 
-int WalkRobot(const RobotWalkOptions& options, bool turns) {
-  if (options.stop == (!options.velocity.empty() || turns)) {
+int WalkRobot(const RobotWalkOptions& options) {
+  if (options.stop == (!options.velocity.empty() || options.turn)) {
     throw ConfigError("walk: needs --velocity, --turn or both; or --stop alone");
   }
   std::vector<double> velocity{0, 0};
@@ -217,26 +234,24 @@ int WalkRobot(const RobotWalkOptions& options, bool turns) {
   const ActedRun run = FindActedRun(options.run, "poise walk");
   if (options.stop) return DoAct(run, ActOf(ActKind::kStopWalking), "stop walking");
   OperatorAct walk = ActOf(ActKind::kWalk);
-  walk.velocity = {velocity[0], velocity[1], options.turn};
+  walk.velocity = {velocity[0], velocity[1], options.turn.value_or(0)};
   return DoAct(run, walk, "walk");
 }
 
 }  // namespace
 
 void AddOperatorCommands(CLI::App* app, Command* command) {
-  auto set_options = std::make_shared<LiveSetOptions>();
-  CLI::App* set = app->add_subcommand("set", "change a setting of a run that goes on");
+  const auto [set, set_options] = AddCommand<LiveSetOptions>(
+      app, command, "set", "change a setting of a run that goes on", SetLiveFields);
   set->add_option("assignment", set_options->assignments,
                   "FIELD=VALUE, as in task_controller.com.kp=200");
   set->add_flag("--list", set_options->list,
                 "the fields that can be set, with range, present value and meaning");
   set->add_option("--run", set_options->run, kWhichRun);
   SetExample(set, "poise set task_controller.com.kp=200");
-  set->callback(
-      [set_options, command] { *command = [set_options] { return SetLiveFields(*set_options); }; });
 
-  auto push_options = std::make_shared<RobotPushOptions>();
-  CLI::App* push = app->add_subcommand("push", "push the simulated robot of a run that goes on");
+  const auto [push, push_options] = AddCommand<RobotPushOptions>(
+      app, command, "push", "push the simulated robot of a run that goes on", PushRobot);
   push->add_option("--body", push_options->body, "link that a joint carries; default: the root");
   push->add_option("--force", push_options->force,
                    "N, world axes: x,y,z; at most ten times the robot's weight")
@@ -248,63 +263,43 @@ void AddOperatorCommands(CLI::App* app, Command* command) {
       ->capture_default_str();
   push->add_option("--run", push_options->run, kWhichRun);
   push->footer("Example: poise push --force 0,60,0 --duration 0.1");
-  push->callback(
-      [push_options, command] { *command = [push_options] { return PushRobot(*push_options); }; });
 
-  auto run = std::make_shared<std::string>();
-  auto foot = std::make_shared<std::string>();
-  auto next = std::make_shared<bool>(false);
-  auto together = std::make_shared<bool>(false);
-  CLI::App* step = app->add_subcommand(
-      "step", "a step in place of a run that goes on: each foot once, then side by side");
-  step->add_option("--foot", *foot, "the one that steps first, e.g. left; default: right");
-  CLI::Option* both = step->add_flag(
-      "--together", *together, "the feet side by side instead, after steps that caught a push");
-  step->add_flag("--next-phase", *next, "end the scenario's phase, whose moves are over, instead")
+  const auto [step, step_options] = AddCommand<RobotStepOptions>(
+      app, command, "step",
+      "a step in place of a run that goes on: each foot once, then side by side", StepInPlace);
+  step->add_option("--foot", step_options->foot,
+                   "the one that steps first, e.g. left; default: right");
+  CLI::Option* both =
+      step->add_flag("--together", step_options->together,
+                     "the feet side by side instead, after steps that caught a push");
+  step->add_flag("--next-phase", step_options->next_phase,
+                 "end the scenario's phase, whose moves are over, instead")
       ->excludes("--together");
-  step->add_option("--run", *run, kWhichRun);
+  step->add_option("--run", step_options->run, kWhichRun);
   both->excludes("--foot");
   SetExample(step, "poise step --foot left");
-  step->callback([run, foot, next, together, command] {
-    *command = [run, foot, next, together] {
-      const ActedRun acted = FindActedRun(*run, "poise step");
-      if (*together) {
-        const int code = DoAct(acted, ActOf(ActKind::kStopWalking), "feet together");
-        // The planner's answer does not tell whether there is anything to do.
-        if (code == kExitOk) fmt::print("feet that stand side by side already stay\n");
-        return code;
-      }
-      return *next ? DoAct(acted, ActOf(ActKind::kNextPhase), "next phase")
-                   : DoAct(acted, ActOf(ActKind::kStep, *foot), "step");
-    };
-  });
 
-  auto move_options = std::make_shared<MoveOptions>();
-  CLI::App* move = app->add_subcommand(
-      "move", "move arms, hands, head or waist in a run that goes on: joints that no leg needs");
+  const auto [move, move_options] = AddCommand<MoveOptions>(
+      app, command, "move",
+      "move arms, hands, head or waist in a run that goes on: joints that no leg needs",
+      MoveJoints);
   move->add_option("assignment", move_options->assignments, "JOINT=ANGLE, in rad")->required();
   move->add_option("--duration", move_options->duration,
                    "s until they rest there; longer where a joint's limits ask for it")
       ->capture_default_str();
   move->add_option("--run", move_options->run, kWhichRun);
   move->footer("Example: poise move left_elbow=0.5 right_elbow=0.5 --duration 0.5");
-  move->callback(
-      [move_options, command] { *command = [move_options] { return MoveJoints(*move_options); }; });
 
-  auto walk_options = std::make_shared<RobotWalkOptions>();
-  CLI::App* walk = app->add_subcommand("walk", "walk, in a run that goes on, or stop walking");
+  const auto [walk, walk_options] = AddCommand<RobotWalkOptions>(
+      app, command, "walk", "walk, in a run that goes on, or stop walking", WalkRobot);
   walk->add_option(
       "--velocity", walk_options->velocity,
       "m/s ahead and to the left, x,y, each within 1; steps and settings of the run allow less");
-  CLI::Option* turn = walk->add_option("--turn", walk_options->turn, "rad/s to the left, within 1");
+  walk->add_option("--turn", walk_options->turn, "rad/s to the left, within 1");
   walk->add_flag("--stop", walk_options->stop,
                  "stand, with the feet side by side, or as they are with walk.quasi_static");
   walk->add_option("--run", walk_options->run, kWhichRun);
   walk->footer("Example: poise walk --velocity 0.1,0 --turn 0.1");
-  walk->callback([walk_options, turn, command] {
-    const bool turns = turn->count() > 0;
-    *command = [walk_options, turns] { return WalkRobot(*walk_options, turns); };
-  });
 }
 
 }  // namespace poise

@@ -69,9 +69,9 @@ int Report(const ReportOptions& options) {
   line.End();
   fmt::print("{}", text);
   if (run.record.spec.has_cut()) {
-    fmt::print("{}\n", Wrapped("part of a run: the scenario's checks are of the whole one and are "
-                               "not judged here",
-                               ScreenStyle().columns));
+    fmt::print("{}", ScreenLines(0,
+                                 "part of a run: the scenario's checks are of the whole one and "
+                                 "are not judged here"));
   } else {
     fmt::print("{}", FormatVerdictLines(run.scenario, run.checks, "", options.full));
   }
@@ -89,9 +89,9 @@ int Report(const ReportOptions& options) {
 }  // namespace
 
 void AddReportCommand(CLI::App* app, Command* command) {
-  auto options = std::make_shared<ReportOptions>();
-  CLI::App* report = app->add_subcommand(
-      "report", "the table of a run from its log, and the run as a page to look at");
+  const auto [report, options] = AddCommand<ReportOptions>(
+      app, command, "report", "the table of a run from its log, and the run as a page to look at",
+      Report);
   report->add_option("run", options->run,
                      "folder of a run or a log, or of charts: a sweep's, limit's, matrix' or "
                      "benchmark's; default: the latest run");
@@ -111,7 +111,6 @@ void AddReportCommand(CLI::App* app, Command* command) {
   report->add_flag("--force", options->force, "replace the file of --html");
   report->add_flag("--full", options->full, "every figure, the events and the assumptions");
   SetExample(report, "poise report runs/latest --full");
-  report->callback([options, command] { *command = [options] { return Report(*options); }; });
 }
 
 }  // namespace poise

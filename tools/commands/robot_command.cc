@@ -42,8 +42,7 @@ int CheckOneRobot(const CheckOptions& options) {
     if (options.json) return check.ok() ? kExitOk : kExitFailed;
     fmt::print("\nThe robot in 3D: {}\n", FileAddress(options.page));
     if (const std::string instead = WhatIsDrawnInstead(drawing); !instead.empty()) {
-      fmt::print("{}\n", Wrapped(instead + " --meshes FOLDER says where they lie.",
-                                 ScreenStyle().columns, 0));
+      fmt::print("{}", ScreenLines(0, "{}", instead + " --meshes FOLDER says where they lie."));
     }
   }
   return check.ok() ? kExitOk : kExitFailed;
@@ -69,12 +68,11 @@ int ListRobots() {
 }  // namespace
 
 void AddRobotCommand(CLI::App* app, Command* command) {
-  CLI::App* robot = app->add_subcommand("robot", "bring a robot of your own, and look at robots");
-  robot->require_subcommand(1);
+  CLI::App* const robot = AddGroup(app, "robot", "bring a robot of your own, and look at robots");
   AddRobotImport(robot, command);
-  auto options = std::make_shared<CheckOptions>();
-  CLI::App* check = robot->add_subcommand(
-      "check", "what a robot is and can do, and what is wrong with its files; takes seconds");
+  const auto [check, options] = AddCommand<CheckOptions>(
+      robot, command, "check",
+      "what a robot is and can do, and what is wrong with its files; takes seconds", CheckOneRobot);
   check
       ->add_option("robot", options->robot,
                    "a name (poise robot list), a robot's folder or its .pbtxt file")
@@ -87,10 +85,9 @@ void AddRobotCommand(CLI::App* app, Command* command) {
           "the maker's file and above it")
       ->check(CLI::ExistingDirectory);
   check->footer("Example: poise robot check heron/heron --page heron.html");
-  check->callback([options, command] { *command = [options] { return CheckOneRobot(*options); }; });
-  CLI::App* list = robot->add_subcommand("list", "the robots that there are");
+  CLI::App* const list =
+      AddCommand(robot, command, "list", "the robots that there are", ListRobots);
   SetExample(list, "poise robot list");
-  list->callback([command] { *command = ListRobots; });
 }
 
 }  // namespace poise

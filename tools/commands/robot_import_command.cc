@@ -105,10 +105,10 @@ int ImportIt(ImportArguments arguments) {
 }  // namespace
 
 void AddRobotImport(CLI::App* robot, Command* command) {
-  auto arguments = std::make_shared<ImportArguments>();
+  const auto [app, arguments] = AddCommand<ImportArguments>(
+      robot, command, "import",
+      "write a folder with a maker's URDF or MJCF file and the text that Poise needs", ImportIt);
   ImportOptions* const options = &arguments->options;
-  CLI::App* app = robot->add_subcommand(
-      "import", "write a folder with a maker's URDF or MJCF file and the text that Poise needs");
   app->footer(
       "Asks nothing: what the file does not say is guessed, and told with how sure it is. Exit "
       "code: 0 written, 2 the file cannot be used, or the robot cannot balance.\nExample: poise "
@@ -136,7 +136,6 @@ void AddRobotImport(CLI::App* robot, Command* command) {
   app->add_option("--body", options->body, "link whose orientation is controlled");
   AddList(app, "--lock", &options->lock, "a joint that is to stand still; may be repeated");
   app->add_flag("--force", arguments->force, "replace a text that is there");
-  app->callback([arguments, command] { *command = [arguments] { return ImportIt(*arguments); }; });
 }
 
 }  // namespace poise

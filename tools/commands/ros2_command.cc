@@ -82,9 +82,9 @@ int Ros2(const Ros2Options& options) {
 }  // namespace
 
 void AddRos2Command(CLI::App* app, Command* command) {
-  auto options = std::make_shared<Ros2Options>();
-  CLI::App* ros2 = app->add_subcommand(
-      "ros2", "a run in progress as ROS 2's standard topics over DDS; it only listens to the run");
+  const auto [ros2, options] = AddCommand<Ros2Options>(
+      app, command, "ros2",
+      "a run in progress as ROS 2's standard topics over DDS; it only listens to the run", Ros2);
   ros2->add_option("run", options->run,
                    "folder or name of the run; default: the only one that goes on");
   ros2->add_option("--domain", options->domain, "DDS domain")
@@ -97,7 +97,6 @@ void AddRos2Command(CLI::App* app, Command* command) {
       ->check(Within("in (0, 10000]", [](double hz) { return hz > 0 && hz <= 10'000; }))
       ->capture_default_str();
   SetExample(ros2, "poise ros2 --rate 50");
-  ros2->callback([options, command] { *command = [options] { return Ros2(*options); }; });
 }
 
 }  // namespace poise

@@ -9,7 +9,7 @@
 #include "tools/run/inline_run.h"
 #include "tools/run/scenario_run.h"
 #include "tools/run/several_runs.h"
-#include "tools/scenario/ablations.h"
+#include "tools/sweep/sweep_session.h"
 
 namespace poise {
 namespace {
@@ -53,9 +53,9 @@ int Run(RunArguments arguments) {
 }  // namespace
 
 void AddRunCommand(CLI::App* app, Command* command) {
-  auto arguments = std::make_shared<RunArguments>();
+  const auto [run, arguments] =
+      AddCommand<RunArguments>(app, command, "run", "run scenarios and check them", Run);
   RunOptions* const options = &arguments->options;
-  CLI::App* run = app->add_subcommand("run", "run scenarios and check them");
   run->footer(
       "Exit codes: 0 all checks hold; 1 a check or the run failed; 2 wrong usage or configuration; "
       "3 (real time) nothing failed but what the machine was too late for, or an injected fault "
@@ -139,25 +139,16 @@ void AddRunCommand(CLI::App* app, Command* command) {
   run->add_flag("--ros2", options->ros2,
                 "tell ROS 2 of the run over DDS: poise ros2 beside it, in domain ROS_DOMAIN_ID")
       ->excludes(in_process);
-  run->add_option("--variant", options->changes.variant,
-                  "run this variant of the scenario (poise list scenarios)");
-  AddList(run, "--without", &options->changes.without, "leave out a part of the controller")
-      ->check(CLI::IsMember(RemovableParts()));
-  run->add_flag("--ideal", options->changes.ideal,
-                "a robot without joint friction, sensor noise, drive train and model error");
+  AddChangeOptions(run, &options->changes,
+                   "change a field of the scenario, e.g. --set sim.push[0].peak=120 or "
+                   "--set 'check[push_peak].at_most=200' (poise list fields); "
+                   "no value: empties a list or group, unsets a number without default");
   run->add_flag("--no-reference", arguments->no_reference,
                 "do not run the scenario's reference variant beside it");
   run->add_option("--robot", options->changes.robot,
                   "a name (poise list robots), a robot's folder or its .pbtxt file; default: the "
                   "scenario's");
-  run->add_option("--world", options->changes.world,
-                  "engine of the simulated robot: ode or mujoco; default: the scenario's");
-  AddList(run, "--set", &options->changes.set,
-          "change a field of the scenario, e.g. --set sim.push[0].peak=120 or "
-          "--set 'check[push_peak].at_most=200' (poise list fields); "
-          "no value: empties a list or group, unsets a number without default",
-          "FIELD=VALUE");
-  run->add_option("--duration", options->changes.duration, "simulated time, s");
+  AddWorld(run, &options->changes.world, "the scenario's");
   run->add_option("--seed", options->changes.seed, "of all noise")->check(Whole());
   run->add_option("--drop", options->changes.drop_rate,
                   "share of the messages that each process drops, to test the recovery")
@@ -186,7 +177,6 @@ void AddRunCommand(CLI::App* app, Command* command) {
   group("In real time", {"--realtime", "--priority", "--cpu", "--kill", "--kill-seed",
                          "--kill-from", "--kill-until"});
   group("Drives and ROS 2", {"--drives", "--link", "--capture", "--ros2"});
-  run->callback([arguments, command] { *command = [arguments] { return Run(*arguments); }; });
 }
 
 }  // namespace poise

@@ -88,11 +88,10 @@ int Prune(const PruneOptions& options) {
 }  // namespace
 
 void AddRunsCommand(CLI::App* app, Command* command) {
-  CLI::App* runs = app->add_subcommand("runs", "what to do with the folders of past runs");
-  runs->require_subcommand(1);
-  auto options = std::make_shared<PruneOptions>();
-  CLI::App* prune = runs->add_subcommand(
-      "prune", "delete the old runs below runs/, after showing them and asking");
+  CLI::App* const runs = AddGroup(app, "runs", "what to do with the folders of past runs");
+  const auto [prune, options] = AddCommand<PruneOptions>(
+      runs, command, "prune", "delete the old runs below runs/, after showing them and asking",
+      Prune);
   prune->footer(
       "Only files that runs write are deleted, and folders that are empty then. A folder of "
       "several "
@@ -103,7 +102,6 @@ void AddRunsCommand(CLI::App* app, Command* command) {
   prune->add_option("--days", options->days, "those that began within so many days stay, too")
       ->check(Within("in [0, 36500]", [](double days) { return days >= 0 && days <= 36500; }));
   prune->add_flag("--yes", options->yes, "delete without asking");
-  prune->callback([options, command] { *command = [options] { return Prune(*options); }; });
 }
 
 }  // namespace poise

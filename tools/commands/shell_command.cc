@@ -13,8 +13,7 @@ namespace poise {
 
 void AddShellCommand(CLI::App* app, Command* command) {
   CLI::App* const shell =
-      app->add_subcommand("shell", "print the manual page, or completion for a shell");
-  shell->require_subcommand(1);
+      AddGroup(app, "shell", "print the manual page, or completion for a shell");
   const auto add = [&](const char* name, const char* description, const std::string& example,
                        std::function<std::string(const CLI::App&)> text) {
     CLI::App* const kind = shell->add_subcommand(name, description);

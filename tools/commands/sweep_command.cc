@@ -22,8 +22,9 @@ struct MergeOptions {
   bool partial = false;
 };
 
-int RunSweep(const SweepArguments& arguments, const SessionOptions& options) {
-  const SweepDefinition definition(arguments, /*limit=*/false);
+int RunSweep(const SweepOptions& given) {
+  const SessionOptions& options = given.session;
+  const SweepDefinition definition(given.arguments, /*limit=*/false);
   const auto [first, end] = SelectedRuns(options, definition.points().size());
   SweepSession session(definition, kKindSweep, options);
   const int64_t before = CountDone(first, end, session.rows());
@@ -94,12 +95,10 @@ int Merge(const MergeOptions& options) {
 }  // namespace
 
 void AddSweepCommand(CLI::App* app, Command* command) {
-  auto arguments = std::make_shared<SweepArguments>();
-  auto session = std::make_shared<SessionOptions>();
-  auto merge_options = std::make_shared<MergeOptions>();
+  auto options = std::make_shared<SweepOptions>();
   CLI::App* sweep =
       app->add_subcommand("sweep", "run a scenario over a grid of values, or over random ones");
-  AddSweepOptions(sweep, arguments.get(), session.get());
+  AddSweepOptions(sweep, options.get());
   sweep->footer(
       "OUT holds results.jsonl (a finished run a line, on the disk before the next begins), "
       "table.csv (a row a run, the same bytes whether resumed, split or in parallel), charts.json "
@@ -108,8 +107,9 @@ void AddSweepCommand(CLI::App* app, Command* command) {
       "docs/reference/sweeps.md.\nExit code: 0 when every run was made, fallen or not; 1 when "
       "interrupted or a run could not be made; 2 wrong usage or configuration.\nExample: poise "
       "sweep push_double_support --vary 'sim.push[0].peak=100:250:7'");
-  CLI::App* merge = sweep->add_subcommand(
-      "merge", "one table from the folders of a sweep's, or a limit's, parts");
+  const auto [merge, merge_options] = AddCommand<MergeOptions>(
+      sweep, command, "merge", "one table from the folders of a sweep's, or a limit's, parts",
+      Merge);
   sweep->require_subcommand(0, 1);
   merge->add_option("folder", merge_options->folders, "folders with results")->required();
   merge->add_option("--out", merge_options->out, "folder for the whole")->required();
@@ -119,11 +119,9 @@ void AddSweepCommand(CLI::App* app, Command* command) {
       "The whole has what one sweep has.\nExit code: 0 when every run was made, fallen or not; 1 "
       "when one could not be made; 2 wrong usage or configuration.\nExample: poise sweep merge "
       "runs/first runs/second --out runs/whole");
-  merge->callback(
-      [merge_options, command] { *command = [merge_options] { return Merge(*merge_options); }; });
-  sweep->callback([arguments, session, command, merge] {
-    if (merge->parsed()) return;
-    *command = [arguments, session] { return RunSweep(*arguments, *session); };
+  // It is called after its command's callback.
+  sweep->callback([options, command, merge = merge] {
+    if (!merge->parsed()) *command = [options] { return RunSweep(*options); };
   });
 }
 

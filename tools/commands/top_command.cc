@@ -141,11 +141,11 @@ int Top(const TopOptions& options) {
 }  // namespace
 
 void AddTopCommand(CLI::App* app, Command* command) {
-  auto options = std::make_shared<TopOptions>();
-  CLI::App* top = app->add_subcommand(
-      "top",
+  const auto [top, options] = AddCommand<TopOptions>(
+      app, command, "top",
       "live view of a run in progress: its processes and channels; arrows scroll, q or Ctrl-C ends "
-      "it");
+      "it",
+      Top);
   top->add_option("run", options->run,
                   "folder or name of the run; default: the only one that goes on");
   top->add_option("--interval", options->interval, "s between views, over which rates are measured")
@@ -159,7 +159,6 @@ void AddTopCommand(CLI::App* app, Command* command) {
       "(--drop); "
       "UNSENT: refused by the system; MISSED: messages that this view did not get in time (the run "
       "is not affected and the log has them).\nExample: poise top --interval 1");
-  top->callback([options, command] { *command = [options] { return Top(*options); }; });
 }
 
 }  // namespace poise

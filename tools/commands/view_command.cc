@@ -98,9 +98,7 @@ class Viewer {
   }
 
  private:
-  static void Say(const std::string& text) {
-    fmt::print("{}\n", Wrapped(text, ScreenStyle().columns, 2));
-  }
+  static void Say(const std::string& text) { fmt::print("{}", ScreenLines(2, "{}", text)); }
 
   void Listen(Clock::time_point now) {
     const int64_t lost = ring_.lost();
@@ -175,9 +173,9 @@ int View(const ViewOptions& options) {
 }  // namespace
 
 void AddViewCommand(CLI::App* app, Command* command) {
-  auto options = std::make_shared<ViewOptions>();
-  CLI::App* view = app->add_subcommand(
-      "view", "the page of a run in progress, live in a browser on this machine");
+  const auto [view, options] = AddCommand<ViewOptions>(
+      app, command, "view", "the page of a run in progress, live in a browser on this machine",
+      View);
   view->add_option("run", options->run,
                    "folder or name of the run; default: the only one that goes on");
   view->add_option("--port", options->port, "on 127.0.0.1; default: a free one")
@@ -193,7 +191,6 @@ void AddViewCommand(CLI::App* app, Command* command) {
   view->add_flag("--control", options->control,
                  "pages with the token of the printed address may push, change settings and stop");
   SetExample(view, "poise view --control");
-  view->callback([options, command] { *command = [options] { return View(*options); }; });
 }
 
 }  // namespace poise

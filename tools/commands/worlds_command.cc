@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <memory>
 #include <set>
-#include <thread>
 #include <utility>
 
 #include "components/framework/configuration/configuration.h"
@@ -304,10 +303,10 @@ int Worlds(WorldsArguments arguments) {
 }  // namespace
 
 void AddWorldsCommand(CLI::App* app, Command* command) {
-  auto arguments = std::make_shared<WorldsArguments>();
+  const auto [worlds, arguments] = AddCommand<WorldsArguments>(
+      app, command, "worlds",
+      "run scenarios in every physics engine and compare what comes of them", Worlds);
   RunOptions* const options = &arguments->options;
-  CLI::App* worlds = app->add_subcommand(
-      "worlds", "run scenarios in every physics engine and compare what comes of them");
   worlds->footer(
       "Of a scenario: each check's figure in each engine, the ratio of the last engine's to the "
       "first one's, and how far the measured foot wrenches are apart (worlds.csv, wrenches.csv). "
@@ -320,27 +319,16 @@ void AddWorldsCommand(CLI::App* app, Command* command) {
                    "names or .pbtxt files of scenarios and sweeps; all: every experiment of the "
                    "paper")
       ->capture_default_str();
-  worlds->add_option("--variant", options->changes.variant, "of the scenario");
-  AddList(worlds, "--without", &options->changes.without, "leave out a part of the controller")
-      ->check(CLI::IsMember(RemovableParts()));
-  worlds->add_flag("--ideal", options->changes.ideal,
-                   "a robot without joint friction, sensor noise, drive train and model error");
-  AddList(worlds, "--set", &options->changes.set,
-          "change a field of the scenario in every engine (poise list fields)", "FIELD=VALUE");
-  worlds->add_option("--duration", options->changes.duration, "simulated time, s");
+  AddChangeOptions(worlds, &options->changes,
+                   "change a field of the scenario in every engine (poise list fields)");
   worlds->add_option("--out", arguments->out,
                      "folder for a run's folder each and worlds.csv; default: a dated one under "
                      "runs/");
-  arguments->session.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  worlds
-      ->add_option("--jobs", arguments->session.jobs,
-                   "runs of a sweep at a time; default: the processor's cores")
-      ->check(CLI::Range(1, 1024));
+  AddJobs(worlds, &arguments->session.jobs, "runs of a sweep at a time");
   worlds->add_option("--range", arguments->session.range, "of a sweep, only points A to B - 1")
       ->type_name("A:B");
   worlds->add_flag("--force", options->force,
                    "replace what --out holds; start though the logs may not fit the disk");
-  worlds->callback([arguments, command] { *command = [arguments] { return Worlds(*arguments); }; });
 }
 
 }  // namespace poise

@@ -83,22 +83,18 @@ std::string FormatEvents(const std::vector<Event>& events) {
   }
   size_t width = 0;
   for (const Event& event : lines) width = std::max(width, event.name.size());
-  const int columns = ScreenStyle().columns;
   std::string text = "Events:\n";
   for (size_t i = 0; i < lines.size(); ++i) {
     if (i == hidden_from && hidden_to > hidden_from + 1) {
-      text += Wrapped(fmt::format("  ... {} more lines to {:.3f} s, which the page has (poise "
-                                  "report): {} ...",
-                                  hidden_to - hidden_from, lines[hidden_to - 1].time,
-                                  Counts(lines, hidden_from, hidden_to)),
-                      columns, 6) +
-              "\n";
+      text += ScreenLines(6,
+                          "  ... {} more lines to {:.3f} s, which the page has (poise "
+                          "report): {} ...",
+                          hidden_to - hidden_from, lines[hidden_to - 1].time,
+                          Counts(lines, hidden_from, hidden_to));
       i = hidden_to;
     }
-    text += Wrapped(fmt::format("  {:7.3f} s  {:<{}}  {}", lines[i].time, Spaced(lines[i].name),
-                                width, lines[i].detail),
-                    columns, static_cast<int>(width) + 15) +
-            "\n";
+    text += ScreenLines(static_cast<int>(width) + 15, "  {:7.3f} s  {:<{}}  {}", lines[i].time,
+                        Spaced(lines[i].name), width, lines[i].detail);
   }
   return text;
 }

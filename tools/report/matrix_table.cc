@@ -226,19 +226,15 @@ std::string FormatMatrix(const std::vector<MatrixCell>& cells) {
   for (const std::vector<const MatrixCell*>& group : ByScenario(cells)) {
     const MatrixCell& first = *group.front();
     lacks = lacks || LacksFigure(group);
-    text += Wrapped(fmt::format("{}{}{}: {}", first.paper_section,
-                                first.paper_section.empty() ? "" : "  ", first.scenario,
-                                first.description),
-                    ScreenStyle().columns, 2) +
-            "\n";
+    text += ScreenLines(2, "{}{}{}: {}", first.paper_section,
+                        first.paper_section.empty() ? "" : "  ", first.scenario, first.description);
     text += FormatScenario(group) + "\n";
   }
   if (failed) {
-    text += Wrapped(
-                "!: outside the limit that the scenario's check sets; at the outcome: a check "
-                "that is not shown failed, see poise report",
-                ScreenStyle().columns, 3) +
-            "\n";
+    text +=
+        ScreenLines(3,
+                    "!: outside the limit that the scenario's check sets; at the outcome: a check "
+                    "that is not shown failed, see poise report");
   }
   if (lacks) text += fmt::format("{}: not judged, the run has no such check\n", kNotJudged);
   return text;

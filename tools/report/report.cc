@@ -232,10 +232,8 @@ std::string FormatUnknown(const std::vector<CheckResult>& checks, bool all) {
   std::string text;
   for (const CheckResult& check : checks) {
     if (check.known() || (!all && !check.limited())) continue;
-    text += Wrapped(fmt::format("  not known: {} ({}), which needs {}", check.label, check.name,
-                                fmt::join(check.missing, " and ")),
-                    ScreenStyle().columns, 4) +
-            "\n";
+    text += ScreenLines(4, "  not known: {} ({}), which needs {}", check.label, check.name,
+                        fmt::join(check.missing, " and "));
   }
   return text;
 }
@@ -313,11 +311,9 @@ std::string FormatAssumptions(const Scenario& scenario) {
   const Scenario values = WithoutAssumptions(scenario);
   for (const Assumption& assumption : scenario.assumption()) {
     const std::string value = ValueOf(values, assumption.field());
-    text += Wrapped(fmt::format("  {:<7}  {}{}{}", assumption.kind(), assumption.field(),
-                                value.empty() ? "" : " = " + value,
-                                assumption.has_reason() ? ": " + assumption.reason() : ""),
-                    ScreenStyle().columns, 11) +
-            "\n";
+    text += ScreenLines(11, "  {:<7}  {}{}{}", assumption.kind(), assumption.field(),
+                        value.empty() ? "" : " = " + value,
+                        assumption.has_reason() ? ": " + assumption.reason() : "");
   }
   return text;
 }

@@ -26,7 +26,7 @@ constexpr size_t kFailures = 5;         // named in lines of their own
 constexpr size_t kFailuresInALine = 3;  // named in one line
 
 std::string Paragraph(const std::string& text) {
-  return text.empty() ? "" : Wrapped(logging::LinesForTerminal(text), ScreenStyle().columns) + "\n";
+  return text.empty() ? "" : ScreenLines(0, "{}", logging::LinesForTerminal(text));
 }
 
 std::string Sentences(const ShownRun& run) {
@@ -206,7 +206,7 @@ std::string FormatVerdictLines(const Scenario& scenario, const std::vector<Check
     }
   }
   for (size_t i = 0; i < std::min(count.failed.size(), kFailures); ++i) {
-    text += Wrapped(fmt::format("  {}", Failure(*count.failed[i])), width, 4) + "\n";
+    text += ScreenLines(4, "  {}", Failure(*count.failed[i]));
   }
   if (count.failed.size() > kFailures) {
     text += fmt::format("  and {} more, in the {}\n", count.failed.size() - kFailures,
@@ -225,7 +225,7 @@ std::string FormatNext(const Scenario& scenario, const std::vector<CheckResult>&
   std::string text = "\nLook further:\n";
   const auto add = [&](const std::string& command, const std::string& what) {
     text += fmt::format("  {} {}\n", program, Toned(command, Tone::kStrong));
-    text += Wrapped(fmt::format("      {}", what), ScreenStyle().columns, 6) + "\n";
+    text += ScreenLines(6, "      {}", what);
   };
   add(fmt::format("report{}", run), "draws the run, step by step, as a page for a browser");
   const int assumptions = scenario.assumption_size();

@@ -219,7 +219,7 @@ struct SweepDefinition::Source {
 
   Source(SweepArguments given, bool limit);
 
-  [[noreturn]] void Fail(const SweepProblem& problem) const;
+  [[noreturn]] void Fail(const std::string& field, const std::string& problem) const;
   /// The flag that gave an element of a list, or the file's place.
   std::string Where(const std::string& field) const;
 
@@ -269,12 +269,12 @@ void SweepDefinition::Source::Read(const std::string& what) {
   }
   file = found;
   if (!written.has_name()) written.set_name(fs::path(found).stem().string());
-  if (!written.has_scenario()) Fail({"scenario", "is missing; name one of deploy/scenarios"});
+  if (!written.has_scenario()) Fail("scenario", "is missing; name one of deploy/scenarios");
   try {
     const fs::path scenario = FindFile("scenarios", written.scenario(), place.parent_path());
     written.set_scenario(scenario.string());
   } catch (const ConfigError& error) {
-    Fail({"scenario", error.what()});
+    Fail("scenario", error.what());
   }
 }
 
@@ -297,19 +297,23 @@ std::string SweepDefinition::Source::Where(const std::string& field) const {
                   : fmt::format("{}: {}", file, field);
 }
 
-void SweepDefinition::Source::Fail(const SweepProblem& problem) const {
-  throw ConfigError(fmt::format("{}: {}", Where(problem.field), problem.text));
+void SweepDefinition::Source::Fail(const std::string& field, const std::string& problem) const {
+  throw ConfigError(fmt::format("{}: {}", Where(field), problem));
 }
 
 SweepDefinition::SweepDefinition(const SweepArguments& arguments, bool limit)
     : points_(Sweep()), changes_(arguments.changes) {
   const Source source(arguments, limit);
   Sweep sweep = source.sweep;
-  if (auto problem = CheckVariables(sweep, limit)) source.Fail(*problem);
+  try {
+    CheckVariables(sweep, limit);
+  } catch (const ConfigError& error) {
+    source.Fail(error.field(), error.problem());
+  }
   const std::vector<std::string> drives = EmulatedDrives();
   if (sweep.has_drives() && std::ranges::find(drives, sweep.drives()) == drives.end()) {
-    source.Fail({"drives", fmt::format("is '{}'; it is {}, or left out", sweep.drives(),
-                                       fmt::join(drives, " or "))});
+    source.Fail("drives", fmt::format("is '{}'; it is {}, or left out", sweep.drives(),
+                                      fmt::join(drives, " or ")));
   }
   points_ = SweepPoints(sweep);
   scenario_ = sweep.scenario();
@@ -353,7 +357,7 @@ void SweepDefinition::CheckFields(const Source& source, Scenario scenario,
                                   const std::optional<double>& limit) const {
   const auto set = [&](Scenario* to, const std::string& field, std::string_view assignment) {
     const size_t equals = assignment.find('=');
-    const auto fail = [&](const std::string& problem) { source.Fail({field, problem}); };
+    const auto fail = [&](const std::string& problem) { source.Fail(field, problem); };
     if (equals == std::string::npos || equals == 0) {
       fail(fmt::format("'{}' must be field.path=value", assignment));
     }
@@ -400,7 +404,7 @@ void SweepDefinition::SetColumns(const Source& source, const Scenario& scenario)
     } else if (std::find(metrics.begin(), metrics.end(), sweep().column(i)) != metrics.end()) {
       add(sweep().column(i));
     } else {
-      source.Fail({fmt::format("column[{}]", i), logging::NoMetric(sweep().column(i))});
+      source.Fail(fmt::format("column[{}]", i), logging::NoMetric(sweep().column(i)));
     }
   }
   if (sweep().column_size() == 0) {
@@ -417,9 +421,9 @@ void SweepDefinition::CheckRequired(const Source& source, const Scenario& scenar
     const std::string& name = sweep().require(i);
     if (std::ranges::find(limited, name) != limited.end()) continue;
     source.Fail(
-        {fmt::format("require[{}]", i),
-         fmt::format("the scenario checks no limit of '{}'; {}", name,
-                     limited.empty() ? "it has no check with a limit" : Suggest(name, limited))});
+        fmt::format("require[{}]", i),
+        fmt::format("the scenario checks no limit of '{}'; {}", name,
+                    limited.empty() ? "it has no check with a limit" : Suggest(name, limited)));
   }
 }
 
@@ -431,16 +435,16 @@ void SweepDefinition::CheckMaps(const Source& source) const {
     for (const auto& [field, name] : {std::pair{"x", map.x()}, std::pair{"y", map.y()}}) {
       if (name.empty() && field[0] == 'y') continue;
       if (std::find(names.begin(), names.end(), name) == names.end()) {
-        source.Fail({fmt::format("map[{}].{}", i, field),
-                     fmt::format("no variable named '{}'; {}", name, Suggest(name, names))});
+        source.Fail(fmt::format("map[{}].{}", i, field),
+                    fmt::format("no variable named '{}'; {}", name, Suggest(name, names)));
       }
     }
     if (map.value() != "stands" &&
         std::find(columns_.begin(), columns_.end(), map.value()) == columns_.end()) {
-      source.Fail({fmt::format("map[{}].value", i),
-                   fmt::format("is '{}', which is no column of the table; it is \"stands\" or one "
-                               "of {}",
-                               map.value(), Joined(columns_, ", "))});
+      source.Fail(fmt::format("map[{}].value", i),
+                  fmt::format("is '{}', which is no column of the table; it is \"stands\" or one "
+                              "of {}",
+                              map.value(), Joined(columns_, ", ")));
     }
   }
 }

@@ -37,70 +37,67 @@ std::vector<SweepValue> GridValues(const Variable& v) {
   return values;
 }
 
-std::optional<SweepProblem> CheckName(const std::string& path, bool has_name,
-                                      const std::string& name, const std::string& field) {
+// The checks throw ConfigError, with the field's path in the sweep.
+
+void CheckName(const std::string& path, bool has_name, const std::string& name,
+               const std::string& field) {
   if (!has_name && field.empty()) {
-    return SweepProblem{path + ".field", "is missing; give a field, a name, or both"};
+    throw ConfigError(path + ".field", "is missing; give a field, a name, or both");
   }
   if (has_name && !IsExpressionName(name)) {
-    return SweepProblem{path + ".name",
-                        fmt::format("is '{}'; use letters, digits and _, and not the name of a "
-                                    "function or constant",
-                                    name)};
+    throw ConfigError(path + ".name",
+                      fmt::format("is '{}'; use letters, digits and _, and not the name of a "
+                                  "function or constant",
+                                  name));
   }
   if (std::find(std::begin(kReserved), std::end(kReserved), name) != std::end(kReserved)) {
-    return SweepProblem{path + ".name", fmt::format("is '{}', a column of every table", name)};
+    throw ConfigError(path + ".name", fmt::format("is '{}', a column of every table", name));
   }
-  return {};
 }
 
-std::optional<SweepProblem> CheckVariable(const Variable& v, const std::string& path, bool random) {
+void CheckVariable(const Variable& v, const std::string& path, bool random) {
   const bool range = v.has_from() || v.has_to();
   const int kinds = (range ? 1 : 0) + (v.value_size() > 0 ? 1 : 0) + (v.choice_size() > 0 ? 1 : 0);
-  if (kinds != 1) return SweepProblem{path, "needs either from and to, or value, or choice"};
+  if (kinds != 1) throw ConfigError(path, "needs either from and to, or value, or choice");
   std::set<std::string> names;
   for (int i = 0; i < v.choice_size(); ++i) {
     const std::string field = fmt::format("{}.choice[{}]", path, i);
-    if (v.choice(i).name().empty()) return SweepProblem{field, "has no name"};
+    if (v.choice(i).name().empty()) throw ConfigError(field, "has no name");
     if (!names.insert(v.choice(i).name()).second) {
-      return SweepProblem{field + ".name",
-                          fmt::format("there are two choices named '{}'", v.choice(i).name())};
+      throw ConfigError(field + ".name",
+                        fmt::format("there are two choices named '{}'", v.choice(i).name()));
     }
   }
   if (v.choice_size() > 0 && v.has_field()) {
-    return SweepProblem{path + ".field", "has no number to take; let the choices set it"};
+    throw ConfigError(path + ".field", "has no number to take; let the choices set it");
   }
   if (!range) {
-    if (v.has_steps()) return SweepProblem{path + ".steps", "goes with from and to"};
-    return {};
+    if (v.has_steps()) throw ConfigError(path + ".steps", "goes with from and to");
+    return;
   }
   RequireFields(v, {"from", "to"}, path + ".");
   if (v.scale() == Variable::LOGARITHMIC && !(v.from() > 0 && v.to() > 0)) {
-    return SweepProblem{path + ".scale", "is logarithmic: from and to must be more than 0"};
+    throw ConfigError(path + ".scale", "is logarithmic: from and to must be more than 0");
   }
   if (random) {
-    if (v.has_steps()) return SweepProblem{path + ".steps", "is of a grid; this sweep is random"};
-    return {};
+    if (v.has_steps()) throw ConfigError(path + ".steps", "is of a grid; this sweep is random");
+    return;
   }
   RequireFields(v, {"steps"}, path + ".");
-  return {};
 }
 
-std::optional<SweepProblem> CheckLimit(const Limit& limit) {
-  if (auto problem = CheckName("limit", limit.has_name(), limit.name(), limit.field())) {
-    return problem;
-  }
+void CheckLimit(const Limit& limit) {
+  CheckName("limit", limit.has_name(), limit.name(), limit.field());
   RequireFields(limit, {"min", "max"}, "limit.");
-  if (!(limit.max() > limit.min())) return SweepProblem{"limit.max", "must be more than min"};
+  if (!(limit.max() > limit.min())) throw ConfigError("limit.max", "must be more than min");
   if (limit.has_cap() && limit.cap() < limit.max()) {
-    return SweepProblem{"limit.cap", "must be max or more"};
+    throw ConfigError("limit.cap", "must be max or more");
   }
   const double range = limit.max() - limit.min();
   if (limit.has_tolerance() && !(limit.tolerance() >= 1e-9 * range && limit.tolerance() <= range)) {
-    return SweepProblem{"limit.tolerance", fmt::format("is {}; must be {} to {}", limit.tolerance(),
-                                                       1e-9 * range, range)};
+    throw ConfigError("limit.tolerance", fmt::format("is {}; must be {} to {}", limit.tolerance(),
+                                                     1e-9 * range, range));
   }
-  return {};
 }
 
 }  // namespace
@@ -195,18 +192,16 @@ std::vector<std::string> SweepPoints::Changes(int64_t run,
   return changes;
 }
 
-namespace {
-
-/// Every single number has been held to its rule.
-std::optional<SweepProblem> VariablesProblem(const Sweep& sweep, bool limit) {
+void CheckVariables(const Sweep& sweep, bool limit) {
+  CheckFields(sweep);
   double runs = sweep.has_random() ? static_cast<double>(sweep.random()) : 1;
   for (const Variable& v : sweep.vary()) {
     if (!sweep.has_random())
       runs *= v.choice_size() + v.value_size() + static_cast<double>(v.steps());
   }
   if (runs > static_cast<double>(kMaxSweepRuns)) {
-    return SweepProblem{sweep.has_random() ? "random" : "vary",
-                        fmt::format("makes {:g} runs; at most {}", runs, kMaxSweepRuns)};
+    throw ConfigError(sweep.has_random() ? "random" : "vary",
+                      fmt::format("makes {:g} runs; at most {}", runs, kMaxSweepRuns));
   }
   std::map<std::string, double> numbers;
   std::set<std::string> names;
@@ -214,25 +209,25 @@ std::optional<SweepProblem> VariablesProblem(const Sweep& sweep, bool limit) {
     const Constant& constant = sweep.constant(i);
     const std::string path = fmt::format("constant[{}].", i);
     if (!IsExpressionName(constant.name())) {
-      return SweepProblem{path + "name",
-                          fmt::format("is '{}'; use letters, digits and _, and not the name of a "
-                                      "function or constant",
-                                      constant.name())};
+      throw ConfigError(path + "name",
+                        fmt::format("is '{}'; use letters, digits and _, and not the name of a "
+                                    "function or constant",
+                                    constant.name()));
     }
     RequireFields(constant, {"value"}, path);
     if (!names.insert(constant.name()).second) {
-      return SweepProblem{path + "name",
-                          fmt::format("is '{}', as another constant's is", constant.name())};
+      throw ConfigError(path + "name",
+                        fmt::format("is '{}', as another constant's is", constant.name()));
     }
     numbers[constant.name()] = constant.value();
   }
   for (int i = 0; i < sweep.vary_size(); ++i) {
     const Variable& v = sweep.vary(i);
     const std::string path = fmt::format("vary[{}]", i);
-    if (auto problem = CheckName(path, v.has_name(), v.name(), v.field())) return problem;
-    if (auto problem = CheckVariable(v, path, sweep.has_random())) return problem;
+    CheckName(path, v.has_name(), v.name(), v.field());
+    CheckVariable(v, path, sweep.has_random());
     if (!names.insert(NameOf(v)).second) {
-      return SweepProblem{path, fmt::format("there are two variables named '{}'", NameOf(v))};
+      throw ConfigError(path, fmt::format("there are two variables named '{}'", NameOf(v)));
     }
     const SweepPoints one([&] {
       Sweep alone;
@@ -245,38 +240,26 @@ std::optional<SweepProblem> VariablesProblem(const Sweep& sweep, bool limit) {
     }
   }
   if (limit) {
-    if (auto problem = CheckLimit(sweep.limit())) return problem;
+    CheckLimit(sweep.limit());
     if (!names.insert(NameOf(sweep.limit())).second) {
-      return SweepProblem{"limit", fmt::format("is '{}', a variable of `vary`; leave it out there",
-                                               NameOf(sweep.limit()))};
+      throw ConfigError("limit", fmt::format("is '{}', a variable of `vary`; leave it out there",
+                                             NameOf(sweep.limit())));
     }
     if (IsExpressionName(NameOf(sweep.limit()))) {
       numbers[NameOf(sweep.limit())] = sweep.limit().min();
     }
   } else if (sweep.vary_size() == 0) {
-    return SweepProblem{"vary", "is missing: nothing differs from run to run"};
+    throw ConfigError("vary", "is missing: nothing differs from run to run");
   }
   for (int i = 0; i < sweep.assign_size(); ++i) {
     const std::string path = fmt::format("assign[{}]", i);
-    if (sweep.assign(i).field().empty()) return SweepProblem{path, "has no field"};
+    if (sweep.assign(i).field().empty()) throw ConfigError(path, "has no field");
     try {
       Evaluate(sweep.assign(i).value(), numbers);
     } catch (const ExpressionError& error) {
-      return SweepProblem{path + ".value",
-                          fmt::format("'{}' {}", sweep.assign(i).value(), error.what())};
+      throw ConfigError(path + ".value",
+                        fmt::format("'{}' {}", sweep.assign(i).value(), error.what()));
     }
-  }
-  return {};
-}
-
-}  // namespace
-
-std::optional<SweepProblem> CheckVariables(const Sweep& sweep, bool limit) {
-  try {
-    CheckFields(sweep);
-    return VariablesProblem(sweep, limit);
-  } catch (const ConfigError& error) {
-    return SweepProblem{error.field(), error.problem()};
   }
 }
 

@@ -50,14 +50,9 @@ class SweepPoints {
   int64_t size_ = 1;
 };
 
-/// A problem of a sweep's field: its path in the sweep ("vary[1].steps") and what is wrong.
-struct SweepProblem {
-  std::string field;
-  std::string text;
-};
-
-/// The first problem of the variables, assignments and limit by themselves; nothing is known of the
-/// scenario's fields. `limit`: a limit is sought.
-std::optional<SweepProblem> CheckVariables(const Sweep& sweep, bool limit);
+/// Checks the variables, assignments and limit by themselves; nothing is known of the scenario's
+/// fields. `limit`: a limit is sought. Throws ConfigError of the first problem, with the field's
+/// path in the sweep, "vary[1].steps".
+void CheckVariables(const Sweep& sweep, bool limit);
 
 }  // namespace poise

@@ -1,6 +1,5 @@
 #include "tools/sweep/sweep_session.h"
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
 #include <deque>
@@ -65,14 +64,9 @@ RunDir MakeSweepDir(const SessionOptions& options, const std::string& kind,
 /// Rows and what was made of them: tables of an earlier sweep beside rows of this one would tell of
 /// another.
 void RemoveResults(const fs::path& folder) {
-  std::vector<fs::path> old;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    const std::string name = entry.path().filename().string();
-    const bool made = name == kResultsFile || name == "table.csv" || name == "limits.csv" ||
-                      name == "charts.json" || name == "charts.html";
-    if (made && entry.is_regular_file()) old.push_back(entry.path());
+  for (const char* made : {kResultsFile, "table.csv", "limits.csv", "charts.json", "charts.html"}) {
+    if (fs::is_regular_file(folder / made)) fs::remove(folder / made);
   }
-  for (const fs::path& file : old) fs::remove(file);
 }
 
 std::string Duration(double seconds) {
@@ -84,9 +78,10 @@ std::string Duration(double seconds) {
 
 }  // namespace
 
-void AddSweepOptions(CLI::App* app, SweepArguments* arguments, SessionOptions* session) {
+void AddSweepOptions(CLI::App* app, SweepOptions* options) {
+  SweepArguments* const arguments = &options->arguments;
+  SessionOptions* const session = &options->session;
   RunChanges* const changes = &arguments->changes;
-  session->jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   // It is not marked as required: CLI11 would take a subcommand's name for it.
   app->add_option("sweep", arguments->what,
                   "name of deploy/sweeps, or a .pbtxt file; or a scenario with --vary");
@@ -106,22 +101,11 @@ void AddSweepOptions(CLI::App* app, SweepArguments* arguments, SessionOptions* s
           "metric of the table (poise list metrics), repeatable, or all; default: those of the "
           "scenario's checks",
           "METRIC");
-  app->add_option("--variant", changes->variant, "of the scenario");
-  AddList(app, "--without", &changes->without, "leave out a part of the controller", "PART")
-      ->check(CLI::IsMember(RemovableParts()));
-  app->add_flag("--ideal", changes->ideal,
-                "a robot without joint friction, sensor noise, drive train and model error");
-  app->add_option("--world", changes->world,
-                  "engine of the simulated robot: ode or mujoco; default: the scenario's");
-  app->add_option("--drives", changes->drives,
-                  "emulated drives between bridge and robot, as of poise run; runs as processes")
-      ->check(CLI::IsMember(EmulatedDrives()));
-  AddList(app, "--set", &changes->set,
-          "change a field of the scenario in every run (poise list fields)", "FIELD=VALUE");
-  app->add_option("--duration", changes->duration, "simulated time of a run, s");
+  AddChangeOptions(app, changes, "change a field of the scenario in every run (poise list fields)");
+  AddWorld(app, &changes->world, "the scenario's");
+  AddDrives(app, &changes->drives);
   app->add_option("--out", session->out, "folder of the results; default: a dated one under runs/");
-  app->add_option("--jobs", session->jobs, "runs at a time; default: the processor's cores")
-      ->check(CLI::Range(1, 1024));
+  AddJobs(app, &session->jobs, "runs at a time");
   CLI::Option* const resume = app->add_flag(
       "--resume", session->resume, "go on with the sweep in --out; an empty folder begins one");
   resume->needs(app->get_option("--out"));
@@ -133,6 +117,35 @@ void AddSweepOptions(CLI::App* app, SweepArguments* arguments, SessionOptions* s
       ->excludes(range);
   app->add_flag("--logs", session->logs, "keep each run's log and files in OUT/logs/POINT");
   app->add_flag("--quiet", session->quiet, "no progress");
+}
+
+void AddChangeOptions(CLI::App* app, RunChanges* changes, const std::string& set) {
+  app->add_option("--variant", changes->variant,
+                  "run this variant of the scenario (poise list scenarios)");
+  AddList(app, "--without", &changes->without, "leave out a part of the controller", "PART")
+      ->check(CLI::IsMember(RemovableParts()));
+  app->add_flag("--ideal", changes->ideal,
+                "a robot without joint friction, sensor noise, drive train and model error");
+  AddList(app, "--set", &changes->set, set.c_str(), "FIELD=VALUE");
+  app->add_option("--duration", changes->duration, "simulated time, s");
+}
+
+void AddWorld(CLI::App* app, std::string* world, const std::string& default_of) {
+  app->add_option("--world", *world,
+                  "engine of the simulated robot: ode or mujoco; default: " + default_of);
+}
+
+CLI::Option* AddDrives(CLI::App* app, std::string* drives) {
+  return app
+      ->add_option("--drives", *drives,
+                   "emulated drives between bridge and robot, as of poise run; runs as processes")
+      ->check(CLI::IsMember(EmulatedDrives()));
+}
+
+void AddJobs(CLI::App* app, int* jobs, const std::string& text) {
+  *jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  app->add_option("--jobs", *jobs, text + "; default: the processor's cores")
+      ->check(CLI::Range(1, 1024));
 }
 
 std::pair<int64_t, int64_t> SelectedRuns(const SessionOptions& options, int64_t size) {

@@ -1,6 +1,7 @@
 // The runs of a sweep or of a limit's search, kept in a folder.
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -12,10 +13,6 @@
 #include "tools/sweep/sweep_definition.h"
 #include "tools/sweep/sweep_results.h"
 #include "tools/sweep/sweep_workers.h"
-
-namespace CLI {
-class App;
-}
 
 namespace poise {
 
@@ -34,9 +31,23 @@ struct SessionOptions {
   bool quiet = false;
 };
 
-/// Adds the options that `poise sweep` and `poise limit` share. Both structs must outlive the
-/// parsing.
-void AddSweepOptions(CLI::App* app, SweepArguments* arguments, SessionOptions* session);
+/// What a sweep's command line says. What an Add function is given must outlive the parsing.
+struct SweepOptions {
+  SweepArguments arguments;
+  SessionOptions session;
+};
+
+/// Adds what `poise sweep`, `limit` and `ladder` share.
+void AddSweepOptions(CLI::App* app, SweepOptions* options);
+
+/// Adds --variant, --without, --ideal, --set and --duration. `set`: the meaning of --set.
+void AddChangeOptions(CLI::App* app, RunChanges* changes, const std::string& set);
+/// Adds --world; `default_of`: whose engine is taken without it.
+void AddWorld(CLI::App* app, std::string* world, const std::string& default_of);
+/// Adds --drives.
+CLI::Option* AddDrives(CLI::App* app, std::string* drives);
+/// Adds --jobs, of which there are as many as processors; `text`: the meaning.
+void AddJobs(CLI::App* app, int* jobs, const std::string& text);
 
 /// First run and the one after the last. Throws ConfigError for a range or part that is none.
 std::pair<int64_t, int64_t> SelectedRuns(const SessionOptions& options, int64_t size);

@@ -12,15 +12,6 @@
 namespace poise {
 namespace {
 
-std::string Line(const std::vector<std::string>& cells) {
-  std::string line;
-  for (const std::string& cell : cells) {
-    if (!line.empty()) line += ',';
-    line += CsvCell(cell);
-  }
-  return line += '\n';
-}
-
 /// The run's number and its variables.
 std::vector<std::string> Place(const SweepPoints& points, int64_t run) {
   std::vector<std::string> cells = {fmt::format("{}", run)};
@@ -44,12 +35,10 @@ std::string SweepCsv(const SweepHeader& header, const SweepRows& rows) {
   const bool limit = header.sweep.has_limit();
   std::vector<std::string> names = PlaceNames(header.sweep);
   if (limit) names.push_back(NameOf(header.sweep.limit()));
-  for (const char* name :
-       {"outcome", "fell_at", "ended_at", "phase", "trouble", "reason", "component", "stage"}) {
-    names.emplace_back(name);
-  }
+  names.insert(names.end(), {"outcome", "fell_at", "ended_at", "phase", "trouble", "reason",
+                             "component", "stage"});
   names.insert(names.end(), header.columns.begin(), header.columns.end());
-  std::string csv = Line(names);
+  std::string csv = CsvLine(names);
   for (const auto& [key, row] : rows) {
     std::vector<std::string> cells = Place(points, row.run);
     if (limit) cells.push_back(CsvNumber(row.limit));
@@ -62,7 +51,7 @@ std::string SweepCsv(const SweepHeader& header, const SweepRows& rows) {
       const auto metric = row.metrics.find(name);
       cells.push_back(metric == row.metrics.end() ? "" : fmt::format("{}", metric->second));
     }
-    csv += Line(cells);
+    csv += CsvLine(cells);
   }
   return csv;
 }
@@ -95,30 +84,13 @@ std::string LimitCsv(const SweepHeader& header, const SweepRows& rows) {
   const SweepPoints points(header.sweep);
   std::vector<std::string> names = PlaceNames(header.sweep);
   names.push_back(NameOf(header.sweep.limit()));
-  for (const char* name : {"fails_at",
-                           "largest_survived",
-                           "monotone",
-                           "runs",
-                           "untold",
-                           "impulse",
-                           "largest_survived_impulse",
-                           "mass",
-                           "com_height",
-                           "distance_to_edge",
-                           "lip_impulse",
-                           "share_of_lip",
-                           "lip_impulse_of_duration",
-                           "share_of_lip_of_duration",
-                           "reach",
-                           "step_time",
-                           "step_impulse",
-                           "share_of_step",
-                           "phase",
-                           "trouble",
-                           "reason"}) {
-    names.emplace_back(name);
-  }
-  std::string csv = Line(names);
+  names.insert(names.end(), {"fails_at", "largest_survived", "monotone", "runs", "untold"});
+  names.insert(names.end(), {"impulse", "largest_survived_impulse", "mass", "com_height"});
+  names.insert(names.end(), {"distance_to_edge", "lip_impulse", "share_of_lip"});
+  names.insert(names.end(), {"lip_impulse_of_duration", "share_of_lip_of_duration", "reach"});
+  names.insert(names.end(), {"step_time", "step_impulse", "share_of_step"});
+  names.insert(names.end(), {"phase", "trouble", "reason"});
+  std::string csv = CsvLine(names);
   for (const LimitPoint& point : LimitPoints(header, rows)) {
     std::vector<std::string> cells = Place(points, point.run);
     cells.insert(cells.end(),
@@ -158,7 +130,7 @@ std::string LimitCsv(const SweepHeader& header, const SweepRows& rows) {
     for (const auto field : {&SweepRow::phase, &SweepRow::trouble, &SweepRow::reason}) {
       cells.push_back(fall != nullptr ? fall->*field : "");
     }
-    csv += Line(cells);
+    csv += CsvLine(cells);
   }
   return csv;
 }

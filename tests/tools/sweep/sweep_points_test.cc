@@ -20,8 +20,12 @@ Sweep Parse(const std::string& text) {
 }
 
 std::string SweepProblemOf(const std::string& text, bool limit = false) {
-  const std::optional<SweepProblem> problem = CheckVariables(Parse(text), limit);
-  return problem ? problem->field + ": " + problem->text : "";
+  try {
+    CheckVariables(Parse(text), limit);
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "";
 }
 
 std::string ExpressionProblem(const std::string& text) {
