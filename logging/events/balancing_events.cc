@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 #include <optional>
 #include <string>
 #include <utility>
@@ -32,14 +31,11 @@ std::string NotAchievedText(const balance_torque_t& balance) {
   const Eigen::Vector2d cop(balance.cop[0], balance.cop[1]);
   const std::string at =
       fmt::format("CoP ({:.1f}, {:.1f}) mm", Tenths(kMilli * cop.x()), Tenths(kMilli * cop.y()));
-  const auto corners = std::clamp<size_t>(balance.num_corners, 0, std::size(balance.corner_x));
-  if (balance.region != balance_torque_t::REGION_POLYGON || corners < 3) {
+  if (balance.region != balance_torque_t::REGION_POLYGON || balance.num_corners < 3) {
     return fmt::format("{}, limits ({:.1f}, {:.1f}) mm", at, kMilli * balance.cop_limit[0],
                        kMilli * balance.cop_limit[1]);
   }
-  std::array<Eigen::Vector2d, std::size(balance_torque_t{}.corner_x)> corner;
-  for (size_t i = 0; i < corners; ++i) corner[i] = {balance.corner_x[i], balance.corner_y[i]};
-  const double inside = balance::SignedDistance(balance::ConvexHull({corner.data(), corners}), cop);
+  const double inside = balance::SignedDistance(AcceptableRegion(balance), cop);
   return inside < 0 ? fmt::format("{}, {:.1f} mm outside the soles' region", at, -kMilli * inside)
                     : fmt::format("{}, at the edge of the soles' region", at);
 }

@@ -198,10 +198,9 @@ bool ObservesFeet(const RunRecord& run) {
 /// Whether the run has what "CHANNEL.field, field" names.
 bool Has(const RunRecord& run, std::string_view what) {
   if (what == "the phases of step_planner") return ReadSchedulePlan(run).has_value();
-  if (what == "a way that step_planner.walk commands")
-    return CommandedCourse(run).commanded_way > 0;
+  if (what == "a way that step_planner.walk commands") return FollowedCourse(run).commanded_way > 0;
   if (what == "a turn that step_planner.walk commands") {
-    return CommandedCourse(run).commanded_turn > 0;
+    return FollowedCourse(run).commanded_turn > 0;
   }
   const size_t dot = std::min(what.find('.'), what.size());
   const std::string_view channel = what.substr(0, dot);

@@ -48,11 +48,6 @@ void VisitCommands(const RunRecord& run, const Visit& visit) {
   }
 }
 
-void AddCommand(const RunRecord& run, const Eigen::Vector3d& velocity, WalkCourse* course) {
-  course->commanded_way += run.duration(1) * velocity.head<2>().norm();
-  course->commanded_turn += run.duration(1) * std::abs(velocity.z());
-}
-
 }  // namespace
 
 double Heading(const ground_truth_t& truth) {
@@ -60,13 +55,6 @@ double Heading(const ground_truth_t& truth) {
   const Eigen::Vector3d ahead =
       Eigen::Quaterniond(q[0], q[1], q[2], q[3]) * Eigen::Vector3d::UnitX();
   return std::atan2(ahead.y(), ahead.x());
-}
-
-WalkCourse CommandedCourse(const RunRecord& run) {
-  WalkCourse course;
-  VisitCommands(
-      run, [&](int64_t, const Eigen::Vector3d& velocity) { AddCommand(run, velocity, &course); });
-  return course;
 }
 
 WalkCourse FollowedCourse(const RunRecord& run) {
@@ -79,7 +67,8 @@ WalkCourse FollowedCourse(const RunRecord& run) {
   };
   std::optional<Place> last;
   VisitCommands(run, [&](int64_t tick, const Eigen::Vector3d& velocity) {
-    AddCommand(run, velocity, &course);
+    course.commanded_way += run.duration(1) * velocity.head<2>().norm();
+    course.commanded_turn += run.duration(1) * std::abs(velocity.z());
     const ground_truth_t* const truth = tick < down ? run.truth.at(tick) : nullptr;
     if (truth == nullptr) return;
     const Place place{tick, GetVector3(truth->com_position).head<2>(), Heading(*truth)};

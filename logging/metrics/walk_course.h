@@ -15,10 +15,9 @@ struct WalkCourse {
   double commanded_turn = 0;  ///< rad
 };
 
-/// What is gone or turned after the robot is down counts for nothing. Needs GROUND_TRUTH.
+/// What is gone or turned after the robot is down counts for nothing. Without GROUND_TRUTH only
+/// what is commanded is known.
 WalkCourse FollowedCourse(const RunRecord& run);
-/// The course without what was followed, which a run without GROUND_TRUTH has, too.
-WalkCourse CommandedCourse(const RunRecord& run);
 
 /// rad, about the vertical: where the base's x axis points.
 double Heading(const ground_truth_t& truth);

@@ -39,6 +39,30 @@ TEST_F(AnalysisTest, ComErrorIsTheLargestAfterTheWindowBegins) {
   EXPECT_EQ(Measure("com_error_max_x"), 0);
 }
 
+TEST(Analysis, MessagesAreThoseOfTheTicksThatHaveOne) {
+  Series<external_push_t> series;
+  for (const int64_t tick : {2, 3, 5, 9}) {
+    external_push_t push{};
+    push.tick = tick;
+    series.Set(tick, push);
+  }
+  std::vector<int64_t> ticks;
+  for (const auto& [tick, push] : Messages(series, 3, 9)) {
+    EXPECT_EQ(push->tick, tick);
+    ticks.push_back(tick);
+  }
+  EXPECT_EQ(ticks, (std::vector<int64_t>{3, 5}));
+  EXPECT_TRUE(Messages(series, 9, 3).empty());
+}
+
+TEST(Analysis, ATriangleMakesASymmetricMatrix) {
+  const double triangle[] = {4, 1, 0, 9, 0, 16};
+  const Eigen::MatrixXd matrix = FromTriangle(triangle, 3);
+  EXPECT_EQ(matrix, (Eigen::Matrix3d() << 4, 1, 0, 1, 9, 0, 0, 0, 16).finished());
+  EXPECT_NEAR(*NormalisedSquare(Eigen::Vector3d(0, 0, 2), matrix), 0.25, 1e-12);
+  EXPECT_FALSE(NormalisedSquare(Eigen::Vector3d(1, 0, 0), -matrix).has_value());
+}
+
 TEST_F(AnalysisTest, BalancingIntervals) {
   for (size_t t = 20; t < 30; ++t) balance_[t].active_y = 1;
   for (size_t t = 28; t < 35; ++t) balance_[t].active_x = 1;

@@ -209,7 +209,7 @@ TEST_F(ForeignControllerTest, AWalkIsHeldAgainstItsCommandedCourse) {
   };
   Walk(0.5);
   turn(0.5);
-  const WalkCourse commanded = CommandedCourse(Read());
+  const WalkCourse commanded = FollowedCourse(Read());
   EXPECT_NEAR(commanded.commanded_way, 0.4, 0.011);
   EXPECT_NEAR(commanded.commanded_turn, 0.1, 0.011);
   EXPECT_NEAR(Measure("walk_course_share"), 100, 5);
@@ -239,8 +239,8 @@ TEST_F(ForeignControllerTest, AWalkIsHeldAgainstItsCommandedCourse) {
   SetHeader(30, &answers_[0]);
   answers_[0].kind = operate::act_t::KIND_WALK;
   answers_[0].verdict = operate::answer_t::VERDICT_DONE;
-  EXPECT_NEAR(CommandedCourse(Read()).commanded_way, 0.1, 0.011);
-  EXPECT_EQ(CommandedCourse(Read()).commanded_turn, 0);
+  EXPECT_NEAR(FollowedCourse(Read()).commanded_way, 0.1, 0.011);
+  EXPECT_EQ(FollowedCourse(Read()).commanded_turn, 0);
 }
 
 TEST_F(ForeignControllerTest, HowHighAFootCameDownIsTheTruths) {

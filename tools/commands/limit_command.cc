@@ -37,12 +37,13 @@ void AddLimitCommand(CLI::App* app, Command* command) {
       "find the largest survivable value of a field, for each point of a grid", RunLimit);
   AddSweepOptions(limit, options);
   Limit* const given = &options->arguments.limit.emplace();
-  const auto number = [&](const char* flag, void (Limit::*set)(double), const char* text) {
-    limit->add_option_function<double>(
+  const auto number = [app = limit, given](const char* flag, void (Limit::*set)(double),
+                                           const char* text) {
+    app->add_option_function<double>(
         flag, [given, set](double v) { (given->*set)(v); }, text);
   };
-  const auto word = [&](const char* flag, const char* text, auto set) {
-    limit->add_option_function<std::string>(
+  const auto word = [app = limit, given](const char* flag, const char* text, auto set) {
+    app->add_option_function<std::string>(
         flag, [given, set](const std::string& v) { set(given, v); }, text);
   };
   word("--field", "the scenario's field whose limit is sought; replaces the file's",

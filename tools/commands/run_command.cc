@@ -167,8 +167,8 @@ void AddRunCommand(CLI::App* app, Command* command) {
       run->add_flag("--quiet", options->quiet, "only errors and the verdict, in one line");
   run->add_flag("--full", options->full, "every figure, the events and the assumptions")
       ->excludes(quiet);
-  const auto group = [&](const char* name, std::initializer_list<const char*> flags) {
-    for (const char* const flag : flags) run->get_option(flag)->group(name);
+  const auto group = [app = run](const char* name, std::initializer_list<const char*> flags) {
+    for (const char* const flag : flags) app->get_option(flag)->group(name);
   };
   group("What is run", {"--variant", "--without", "--ideal", "--no-reference", "--robot", "--world",
                         "--set", "--duration", "--seed"});
