@@ -67,10 +67,7 @@ constexpr Needs kNeeds[] = {
      "JOINT_COMMAND.in_contact, foot_wrench, margins; ROBOT_SENSORS.foot_wrench | "
      "ROBOT_STATE.foot_wrench"},
     {"*foot_*_computed_max", "JOINT_COMMAND.in_contact, foot_wrench, margins"},
-    {"foot_force_error_internal_rms",
-     "JOINT_COMMAND.in_contact, foot_wrench, margins; ROBOT_SENSORS.foot_wrench | "
-     "ROBOT_STATE.foot_wrench; SUPPORT_PLAN.in_contact; PLANNER_STATUS.foot_pose"},
-    {"foot_force_error_resultant_rms",
+    {"foot_force_error_*_rms",
      "JOINT_COMMAND.in_contact, foot_wrench, margins; ROBOT_SENSORS.foot_wrench | "
      "ROBOT_STATE.foot_wrench; SUPPORT_PLAN.in_contact; PLANNER_STATUS.foot_pose"},
     {"*foot_*_error_*rms",
@@ -109,10 +106,7 @@ constexpr Needs kNeeds[] = {
      "a reference run; JOINT_COMMAND.in_contact; GROUND_TRUTH.foot_pose"},
     {"*_foot_sink", "PLANNER_STATUS.foot_state | JOINT_COMMAND.in_contact; GROUND_TRUTH.foot_pose"},
     {"touch_down", "PLANNER_STATUS.foot_state"},
-    {"early_contacts",
-     "PLANNER_STATUS.foot_state, foot_pose; SUPPORT_PLAN.foot_reference; the phases of "
-     "step_planner"},
-    {"late_contacts",
+    {"*_contacts",
      "PLANNER_STATUS.foot_state, foot_pose; SUPPORT_PLAN.foot_reference; the phases of "
      "step_planner"},
     {"no_surface_stops", "PLANNER_STATUS.foot_state"},

@@ -46,6 +46,13 @@ bool Hops(const RunRecord& run, const TrueStep& step) {
   return from && to && (*to - *from).norm() < kHopWay;
 }
 
+/// Whether a foot that is off the ground in these intervals carries at a tick.
+bool Carries(const RunRecord& run, const std::vector<Interval>& off, int64_t tick) {
+  return std::ranges::none_of(off, [&](const Interval& i) {
+    return i.begin <= tick && tick < i.end.value_or(run.num_ticks);
+  });
+}
+
 /// What IsDown compares with, found once.
 class Stance {
  public:
@@ -124,16 +131,12 @@ std::array<std::vector<Interval>, 2> OffTheGround(const RunRecord& run) {
 std::vector<TrueStep> TrueSteps(const RunRecord& run) {
   std::vector<TrueStep> steps;
   const auto off = OffTheGround(run);
-  const auto carries = [&](size_t foot, int64_t tick) {
-    return std::ranges::none_of(off[foot], [&](const Interval& i) {
-      return i.begin <= tick && tick < i.end.value_or(run.num_ticks);
-    });
-  };
   for (size_t foot = 0; foot < 2; ++foot) {
     for (const Interval& interval : off[foot]) {
       // A robot that hung from a crane with both feet was put down. On one foot it steps.
-      const bool hung = interval.begin <= run.spec.lead_ticks() &&
-                        !carries(1 - foot, std::max(interval.begin, run.spec.lead_ticks()));
+      const bool hung =
+          interval.begin <= run.spec.lead_ticks() &&
+          !Carries(run, off[1 - foot], std::max(interval.begin, run.spec.lead_ticks()));
       if (!interval.end || hung) continue;
       steps.push_back({foot, interval.begin, *interval.end});
     }
@@ -150,15 +153,6 @@ std::vector<TrueStep> TrueSteps(const RunRecord& run) {
 std::vector<TrueSupport> TrueSupports(const RunRecord& run) {
   const auto off = OffTheGround(run);
   const int64_t start = run.spec.lead_ticks();
-  const auto carries = [&](int64_t tick) {
-    std::array<bool, 2> feet{};
-    for (size_t foot = 0; foot < 2; ++foot) {
-      feet[foot] = std::ranges::none_of(off[foot], [&](const Interval& i) {
-        return i.begin <= tick && tick < i.end.value_or(run.num_ticks);
-      });
-    }
-    return feet;
-  };
   std::vector<int64_t> ticks = {start};
   for (const auto& intervals : off) {
     for (const Interval& interval : intervals) {
@@ -170,7 +164,7 @@ std::vector<TrueSupport> TrueSupports(const RunRecord& run) {
   std::vector<TrueSupport> supports;
   bool known = false;
   for (const int64_t tick : ticks) {
-    const std::array<bool, 2> feet = carries(tick);
+    const std::array<bool, 2> feet = {Carries(run, off[0], tick), Carries(run, off[1], tick)};
     if (!supports.empty() && supports.back().carries == feet) continue;
     supports.push_back({tick, feet});
     known = known || feet[0] || feet[1];

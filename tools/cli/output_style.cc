@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <utility>
 
+#include "tools/cli/output_place.h"
 #include "tools/cli/plain_streams.h"
 
 namespace poise {
@@ -87,13 +87,7 @@ ssize_t WritePlain(void* cookie, const char* data, size_t size) {
     text.resize(begin - 1);
   }
   const std::string plain = keep_unicode ? text : PlainText(text);
-  for (size_t done = 0; done < plain.size();) {
-    const ssize_t written = write(stream->fd, plain.data() + done, plain.size() - done);
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return 0;
-    done += static_cast<size_t>(written);
-  }
-  return static_cast<ssize_t>(size);
+  return WriteAll(stream->fd, plain) ? static_cast<ssize_t>(size) : 0;
 }
 
 FILE* OpenPlain(PlainStream* stream, int mode) {

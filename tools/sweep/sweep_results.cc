@@ -11,6 +11,7 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
+#include "tools/cli/output_place.h"
 
 namespace poise {
 namespace {
@@ -106,15 +107,7 @@ SweepResultsWriter::~SweepResultsWriter() { close(fd_); }
 void SweepResultsWriter::Append(const SweepRow& row) { Write(SweepRow::RowText(row)); }
 
 void SweepResultsWriter::Write(const std::string& line) {
-  const std::string text = line + '\n';
-  size_t written = 0;
-  while (written < text.size()) {
-    const ssize_t count = write(fd_, text.data() + written, text.size() - written);
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) break;
-    written += static_cast<size_t>(count);
-  }
-  if (written < text.size() || fdatasync(fd_) != 0) {
+  if (!WriteAll(fd_, line + '\n') || fdatasync(fd_) != 0) {
     throw std::runtime_error(fmt::format("{}: cannot be written: {}", path_, std::strerror(errno)));
   }
 }
