@@ -24,12 +24,22 @@ RobotModel MakeRobot(const Robot& description, std::string_view maker_text,
 LinkTree MakeTree(const Robot& description, std::string_view maker_text,
                   std::vector<std::string>* warnings = nullptr);
 
-/// The maker's file that a Robot file names: urdf or mjcf, relative to it. Throws RobotError: it
-/// names none or both, or there is no such file, and then says where to get it and where to put it.
-std::string MakerFile(const Robot& description, const std::string& robot_path);
+/// A robot's files as they are on disk.
+struct RobotFiles {
+  std::string file, text;
+  Robot description;                   ///< what the text says
+  std::string maker_file, maker_text;  ///< URDF or MJCF, which the description names
 
-/// Reads the Robot file and the maker's. Throws RobotError, one line that begins with the file at
-/// fault.
+  /// Throws RobotError, one line that begins with the file at fault.
+  RobotModel Model(std::vector<std::string>* warnings = nullptr) const;
+};
+
+/// Reads both. Throws RobotError, one line that begins with the file at fault: it cannot be read, or
+/// names no maker's file, two, or one that is not there, and then says where to get it and where to
+/// put it.
+RobotFiles ReadRobotFiles(const std::string& robot_path);
+
+/// The model of ReadRobotFiles. Throws as that and RobotFiles::Model do.
 RobotModel LoadRobotFiles(const std::string& robot_path,
                           std::vector<std::string>* warnings = nullptr);
 

@@ -103,10 +103,9 @@ BenchmarkRobot ReadBenchmarkRobot(const std::string& name) {
   BenchmarkRobot robot;
   robot.name = name;
   robot.file = FindFile("robots", name, fs::current_path()).string();
-  Robot description;
-  ReadTextProto(robot.file, &description);
-  robot.maker_file = robot::MakerFile(description, robot.file);
-  const robot::RobotModel model = robot::LoadRobotFiles(robot.file);
+  const robot::RobotFiles files = robot::ReadRobotFiles(robot.file);
+  robot.maker_file = files.maker_file;
+  const robot::RobotModel model = files.Model();
   const robot::RobotState start = SolveStart(model, StartPosture());
   const robot::RobotData data = robot::Evaluate(model, start);
   constexpr size_t kLeft = 1;

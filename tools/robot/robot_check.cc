@@ -299,10 +299,9 @@ std::string FormatPushes(const RobotCheck& check, int columns) {
 RobotCheck CheckRobot(const std::filesystem::path& file) {
   RobotCheck check;
   check.file = file.string();
-  check.model = robot::LoadRobotFiles(check.file, &check.left_out);
-  Robot description;
-  ReadTextProto(check.file, &description);
-  check.maker_file = robot::MakerFile(description, check.file);
+  const robot::RobotFiles files = robot::ReadRobotFiles(check.file);
+  check.model = files.Model(&check.left_out);
+  check.maker_file = files.maker_file;
   try {
     check.stance = SolveStart(check.model, StartPosture());
   } catch (const ConfigError& error) {
@@ -312,7 +311,7 @@ RobotCheck CheckRobot(const std::filesystem::path& file) {
   check.com_height = data.com.z() - data.foot_pose[0].translation().z();
   check.frequency = std::sqrt(robot::kGravity / check.com_height);
   check.foot_spacing = data.foot_pose[1].translation().y() - data.foot_pose[0].translation().y();
-  FindSoles(description, &check);
+  FindSoles(files.description, &check);
   FindLoads(&check);
   check.reach = {ReachAlong(check, Vector3d::UnitX()), ReachAlong(check, -Vector3d::UnitX()),
                  ReachAlong(check, Vector3d::UnitY()), ReachAlong(check, Vector3d::UnitZ())};

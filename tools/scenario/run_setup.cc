@@ -20,7 +20,6 @@
 #include "components/framework/configuration/suggest.h"
 #include "components/framework/optional_ports.h"
 #include "components/framework/run.h"
-#include "components/robot_files/robot.pb.h"
 #include "components/robot_files/robot_files.h"
 #include "components/step_planner/walk_config.h"
 #include "fmt/format.h"
@@ -285,11 +284,12 @@ void HostComponents(const RunChanges& changes, Graph* graph) {
   }
 }
 
-void AddResource(RunSpec* spec, const std::string& name, const fs::path& file) {
+void AddResource(RunSpec* spec, const std::string& name, const std::string& file,
+                 const std::string& text) {
   Resource* resource = spec->add_resource();
   resource->set_name(name);
-  resource->set_file(file.string());
-  resource->set_text(ReadFile(file.string()));
+  resource->set_file(file);
+  resource->set_text(text);
 }
 
 [[noreturn]] void FailGraph(const std::string& file, const GraphError& error) {
@@ -354,9 +354,8 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
   spec.set_num_ticks(spec.lead_ticks() + std::max<int64_t>(1, std::llround(scenario.duration() *
                                                                            scenario.tick_rate())));
   WriteConfigs(scenario, &spec);
-  Robot robot;
-  ReadTextProto(loaded.robot_file, &robot);
-  const robot::RobotModel model = robot::LoadRobotFiles(loaded.robot_file);
+  const robot::RobotFiles robot = robot::ReadRobotFiles(loaded.robot_file);
+  const robot::RobotModel model = robot.Model();
   if (warnings != nullptr) {
     for (int i = 0; i < scenario.sim().push_size(); ++i) {
       const double start = scenario.sim().push(i).start();
@@ -370,8 +369,8 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
       warnings->push_back("step_planner." + text);
     }
   }
-  AddResource(&spec, "robot", loaded.robot_file);
-  AddResource(&spec, "urdf", robot::MakerFile(robot, loaded.robot_file));
+  AddResource(&spec, "robot", robot.file, robot.text);
+  AddResource(&spec, "urdf", robot.maker_file, robot.maker_text);
   spec.set_realtime(changes.realtime);
   if (changes.priority) spec.mutable_realtime_options()->set_priority(*changes.priority);
   if (changes.cpu) spec.mutable_realtime_options()->set_cpu(*changes.cpu);
