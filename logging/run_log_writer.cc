@@ -128,6 +128,11 @@ void RunLogWriter::Close() {
   log_.Close(/*sums=*/true);
 }
 
+std::string TimeNow() {
+  const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
+  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(now));
+}
+
 run_info_t MakeRunInfo(const RunSpec& spec, const std::string& scenario) {
   run_info_t info{};
   info.run_id = spec.run_id();
@@ -135,8 +140,7 @@ run_info_t MakeRunInfo(const RunSpec& spec, const std::string& scenario) {
   info.scenario = scenario;
   info.robot = ResourceOf(spec, "robot").text();
   info.urdf = ResourceOf(spec, "urdf").text();
-  const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
-  info.started_at = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(now));
+  info.started_at = TimeNow();
   return info;
 }
 

@@ -69,7 +69,11 @@ class RunLogWriter {
   int health_utime_offset_ = 0;
 };
 
-/// RUN_INFO of a run: the texts that a replay needs. `scenario` is the scenario's text.
+/// This moment as RUN_INFO.started_at has it, ISO 8601 in UTC.
+std::string TimeNow();
+
+/// RUN_INFO of a run that starts now: the texts that a replay needs. `scenario` is the scenario's
+/// text.
 run_info_t MakeRunInfo(const RunSpec& spec, const std::string& scenario);
 
 }  // namespace poise::logging

@@ -1,7 +1,5 @@
 #include "python/session.h"
 
-#include <google/protobuf/text_format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -14,7 +12,6 @@
 #include "fmt/format.h"
 #include "logging/events/bridge_words.h"
 #include "poise/bridge_status_t.hpp"
-#include "tools/cli/output_place.h"
 #include "tools/scenario/described_components.h"
 #include "tools/scenario/registry.h"
 #include "tools/scenario/run_setup.h"
@@ -149,13 +146,9 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
   spec_ = MakeRunSpec(loaded, options.changes, &warnings_);
   if (options.endless) spec_.set_num_ticks(0);
   scenario_ = ScenarioText(loaded.scenario);
-  if (options.replaced.empty() && !options.plant) {
-    CheckRun(loaded, &spec_);  // which names file and line
-    registry_ = Components();
-  } else {
-    Replace(options, &registry_);
-    CheckGraph(spec_.graph(), registry_);
-  }
+  const bool replaces = !options.replaced.empty() || options.plant;
+  ComponentRegistry registry;
+  if (replaces) Replace(options, &registry);
   const std::string program = OwnProgramOf(spec_.graph());
   if (!program.empty()) {
     throw ConfigError(
@@ -163,8 +156,10 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
         ", which this process cannot hold; give an object in its place, components={name: "
         "object}, or run it with poise run");
   }
-  runner_ = std::make_unique<InlineRunner>(spec_, registry_);
-  FillPlan(runner_->plan(), spec_.mutable_graph());
+  // Where nothing is replaced, an error names file and line.
+  BoundGraph graph = replaces ? BoundGraph(spec_, registry) : ConfigureRun(loaded, &spec_);
+  FillPlan(graph.plan(), spec_.mutable_graph());
+  runner_ = std::make_unique<InlineRunner>(spec_, std::move(graph));
   names_ = logging::ElementNames::OfSpec(spec_);
   for (int i = 0; i < runner_->graph().num_components(); ++i) {
     Component* const component = runner_->graph().component(i).component.get();
@@ -206,10 +201,7 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
   const run_info_t info = logging::MakeRunInfo(spec_, scenario_);
   if (keep_ == SessionOptions::Keep::kFolder) {
     dir_.emplace(MakeRunDir(options.out, spec_.scenario(), options.force));
-    std::string text;
-    google::protobuf::TextFormat::PrintToString(spec_, &text);
-    WriteFile(dir_->path() / "run_spec.pbtxt", text);
-    WriteFile(dir_->path() / "scenario.pbtxt", scenario_);
+    WriteRunFiles(dir_->path(), info);
     log_ = dir_->path() / "run.lcm";
     recorder_ = std::make_unique<logging::InlineRecorder>(log_, spec_, info, runner_.get());
   } else if (keep_ == SessionOptions::Keep::kMemory) {

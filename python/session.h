@@ -116,7 +116,6 @@ class Session {
   std::string scenario_;
   std::vector<std::string> warnings_;
   logging::ElementNames names_;
-  ComponentRegistry registry_;
   std::unique_ptr<InlineRunner> runner_;
   std::vector<ForeignComponent*> foreign_;
   std::shared_ptr<const robot::RobotModel> model_;

@@ -96,10 +96,13 @@ class BoundGraph {
   /// them. Throws GraphError or ConfigError.
   BoundGraph(const RunSpec& spec, const ComponentRegistry& registry,
              std::atomic<int>* configuring = nullptr);
+  BoundGraph(BoundGraph&&) = default;
+  BoundGraph& operator=(BoundGraph&&) = default;
 
   const GraphPlan& plan() const { return plan_; }
   int num_components() const { return static_cast<int>(components_.size()); }
   ConfiguredComponent& component(int i) { return components_[static_cast<size_t>(i)]; }
+  const ConfiguredComponent& component(int i) const { return components_[static_cast<size_t>(i)]; }
 
  private:
   SharedObjects shared_;

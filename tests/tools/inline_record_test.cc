@@ -5,9 +5,7 @@
 
 #include "logging/recording/inline_recorder.h"
 #include "tests/logging/log_test_support.h"
-#include "tools/scenario/registry.h"
 #include "tools/scenario/run_setup.h"
-#include "tools/scenario/scenario_loading.h"
 
 namespace poise::logging {
 namespace {
@@ -27,16 +25,14 @@ void ExpectSame(const Series<T>& kept, const Series<T>& read, int64_t ticks) {
 TEST(InlineRecord, IsWhatIsReadOfTheLog) {
   RunChanges changes;
   changes.duration = 0.2;
-  const LoadedScenario loaded = LoadScenario("push_double_support", changes);
-  std::vector<std::string> warnings;
-  RunSpec spec = MakeRunSpec(loaded, changes, &warnings);
-  CheckRun(loaded, &spec);
+  RunSetup setup = SetUpRun("push_double_support", changes);
+  const RunSpec& spec = setup.spec;
   const TemporaryFolder folder;
   const std::string log = folder.path("run.lcm");
   RunRecord kept;
   {
-    InlineRunner runner(spec, Components());
-    const run_info_t info = MakeRunInfo(spec, ScenarioText(loaded.scenario));
+    InlineRunner runner(spec, std::move(*setup.graph));
+    const run_info_t info = MakeRunInfo(spec, ScenarioText(setup.loaded.scenario));
     InlineRecord record(spec, info, &runner);
     InlineRecorder recorder(log, spec, info, &runner, &record);
     runner.Run(spec.num_ticks());

@@ -69,10 +69,7 @@ Outcome Start(const Lost& lost, std::vector<std::string> set = {}, bool realtime
   changes.duration = 1;
   changes.set = std::move(set);
   changes.set.insert(changes.set.begin(), "sim.push=");
-  const LoadedScenario loaded = LoadScenario("push_double_support", changes);
-  std::vector<std::string> warnings;
-  RunSpec spec = MakeRunSpec(loaded, changes, &warnings);
-  CheckRun(loaded, &spec);
+  const RunSpec spec = SetUpRun("push_double_support", changes).spec;
   ComponentRegistry registry;
   for (const auto& [type, entry] : Components().entries()) {
     ComponentFactory factory = entry.make;

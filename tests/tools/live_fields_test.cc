@@ -52,10 +52,7 @@ std::vector<Prepared> Runs() {
     for (const std::string& variant : variants) {
       RunChanges changes;
       changes.variant = variant;
-      const LoadedScenario loaded = LoadScenario(scenario, changes);
-      std::vector<std::string> warnings;
-      runs.push_back({scenario + " " + variant, MakeRunSpec(loaded, changes, &warnings)});
-      CheckRun(loaded, &runs.back().spec);
+      runs.push_back({scenario + " " + variant, SetUpRun(scenario, changes).spec});
     }
   }
   return runs;

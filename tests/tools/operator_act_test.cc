@@ -16,7 +16,6 @@
 #include "tools/live/view_access.h"
 #include "tools/run/local_server.h"
 #include "tools/scenario/run_setup.h"
-#include "tools/scenario/scenario_loading.h"
 
 namespace poise {
 namespace {
@@ -34,13 +33,7 @@ std::string ProblemOf(const std::string& text) {
   return ReadAct(text, &act, &problem) ? "" : problem;
 }
 
-RunSpec StandSpec() {
-  const LoadedScenario loaded = LoadScenario("stand", {});
-  std::vector<std::string> warnings;
-  RunSpec spec = MakeRunSpec(loaded, {}, &warnings);
-  CheckRun(loaded, &spec);
-  return spec;
-}
+RunSpec StandSpec() { return SetUpRun("stand", {}).spec; }
 
 template <class Message>
 std::vector<uint8_t> BytesOf(const Message& message) {

@@ -11,7 +11,6 @@
 #include "tools/commands/commands.h"
 #include "tools/scenario/catalog.h"
 #include "tools/scenario/graph_files.h"
-#include "tools/scenario/registry.h"
 #include "tools/scenario/run_setup.h"
 
 namespace poise {
@@ -39,8 +38,7 @@ bool IsScenario(const std::string& file) {
   return true;
 }
 
-void ShowRun(const RunSpec& spec) {
-  BoundGraph bound(spec, Components());
+void ShowRun(const RunSpec& spec, const BoundGraph& bound) {
   const GraphPlan& plan = bound.plan();
   const auto name_of = [&](const GraphPlan::Endpoint& end) {
     return spec.graph().component(end.component).name();
@@ -98,26 +96,22 @@ int CheckByName(const GraphOptions& options) {
         file);
     return kExitOk;
   }
-  const LoadedScenario loaded = LoadScenario(file, {});
-  std::vector<std::string> warnings;
-  RunSpec spec = MakeRunSpec(loaded, {}, &warnings);
-  CheckRun(loaded, &spec);
+  const RunSetup setup = SetUpRun(file, {});
+  const LoadedScenario& loaded = setup.loaded;
+  const RunSpec& spec = setup.spec;
+  std::vector<std::string> warnings = setup.warnings;
   std::string variants;
   std::string problems;
   for (const Variant& variant : loaded.scenario.variant()) {
     RunChanges changes;
     changes.variant = variant.name();
     try {
-      const LoadedScenario changed = LoadScenario(file, changes);
-      std::vector<std::string> own;
-      RunSpec changed_spec = MakeRunSpec(changed, changes, &own);
-      CheckRun(changed, &changed_spec);
-      for (const std::string& text : own) {
+      for (const std::string& text : SetUpRun(file, changes).warnings) {
         if (std::ranges::find(warnings, text) != warnings.end()) continue;
         warnings.push_back(fmt::format("variant {}: {}", variant.name(), text));
       }
       variants += ", " + variant.name();
-    } catch (const ConfigError& error) {
+    } catch (const std::runtime_error& error) {
       // One of a base may not fit what is run: the others are told of all the same.
       problems += fmt::format("variant {}: {}\n", variant.name(), error.what());
     }
@@ -130,7 +124,7 @@ int CheckByName(const GraphOptions& options) {
   fmt::print("{} with {}: {} components, {} channels, {}{}\n", loaded.files.file(),
              loaded.graph_file, spec.graph().component_size(), spec.graph().channel_size(), verdict,
              variants.empty() ? "" : "; variants too: " + variants.substr(2));
-  ShowRun(spec);
+  ShowRun(spec, *setup.graph);
   if (problems.empty()) return kExitOk;
   fmt::print(stderr, "poise: {}", problems);
   return kExitUsage;

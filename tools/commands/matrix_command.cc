@@ -62,9 +62,8 @@ Job MakeJob(const std::string& scenario, const std::string& unique_name, const s
   changes.variant = variant;
   changes.ideal = ablation.ideal;
   changes.without = ablation.without;
-  const LoadedScenario loaded = LoadScenario(scenario, changes);
-  RunSpec spec = MakeRunSpec(loaded, changes, nullptr);
-  CheckRun(loaded, &spec);
+  const RunSetup setup = SetUpRun(scenario, changes);
+  const LoadedScenario& loaded = setup.loaded;
   Job job;
   job.cell.scenario = unique_name;
   job.cell.description = loaded.scenario.description();
@@ -82,7 +81,7 @@ Job MakeJob(const std::string& scenario, const std::string& unique_name, const s
   for (const std::string& word : job.arguments) {
     if (word != "--quiet") job.cell.command += " " + ShellWord(word);
   }
-  job.log_size = ExpectedLogSize(spec) * (loaded.scenario.has_reference() ? 2 : 1);
+  job.log_size = ExpectedLogSize(setup.spec) * (loaded.scenario.has_reference() ? 2 : 1);
   job.work = loaded.scenario.duration() * (loaded.scenario.has_reference() ? 2 : 1);
   return job;
 }

@@ -143,8 +143,7 @@ void WriteRun(const ReplayOptions& options, const std::string& log, const fs::pa
     change->set_set(set);
   }
   info.scenario = ScenarioText(scenario);
-  WriteFile(dir / "run_spec.pbtxt", info.run_spec);
-  WriteFile(dir / "scenario.pbtxt", info.scenario);
+  WriteRunFiles(dir, info);
   replay.Write(dir / "run.lcm", info, changed);
   if (const fs::path reference = ReferenceDir(fs::path(log).parent_path());
       fs::exists(reference / "run.lcm")) {

@@ -33,8 +33,8 @@ int Run(RunArguments arguments) {
     arguments.options.in_process = true;
     arguments.options.interactive = [page = arguments.page](
                                         const RunSpec& spec, const Scenario& scenario,
-                                        const std::string& text, const std::string& log) {
-      return RunInteractive(spec, scenario, text, log, page);
+                                        const run_info_t& info, const std::string& log) {
+      return RunInteractive(spec, scenario, info, log, page);
     };
   }
   arguments.options.changes.reference = !arguments.no_reference;

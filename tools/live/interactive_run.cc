@@ -40,11 +40,11 @@ constexpr int kMostBranches = 8;  // kept beside the log; each may take 3 MB a s
 
 class InteractiveRun {
  public:
-  InteractiveRun(const RunSpec& spec, const Scenario& scenario, std::string scenario_text,
-                 std::string log, const InteractiveOptions& options)
+  InteractiveRun(const RunSpec& spec, const Scenario& scenario, run_info_t info, std::string log,
+                 const InteractiveOptions& options)
       : spec_(spec),
         scenario_(scenario),
-        info_(logging::MakeRunInfo(spec, scenario_text)),
+        info_(std::move(info)),
         log_(std::move(log)),
         run_id_(std::to_string(spec.run_id())),
         port_(spec, [this](const OperatorAct& act) { return Pace(act); }),
@@ -291,10 +291,9 @@ class InteractiveRun {
 
 }  // namespace
 
-RunOutcome RunInteractive(const RunSpec& spec, const Scenario& scenario,
-                          const std::string& scenario_text, const std::string& log,
-                          const InteractiveOptions& options) {
-  return InteractiveRun(spec, scenario, scenario_text, log, options).Run();
+RunOutcome RunInteractive(const RunSpec& spec, const Scenario& scenario, const run_info_t& info,
+                          const std::string& log, const InteractiveOptions& options) {
+  return InteractiveRun(spec, scenario, info, log, options).Run();
 }
 
 }  // namespace poise

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "components/framework/graph.pb.h"
+#include "poise/run_info_t.hpp"
 #include "tools/report/run_outcome.h"
 #include "tools/scenario/scenario.pb.h"
 
@@ -18,8 +19,7 @@ struct InteractiveOptions {
 /// that of a run that went on from the start as it was left: to go back begins `log` anew with all
 /// acts before that tick, and keeps the one that was left as branch_1.lcm, branch_2.lcm, ... beside
 /// it. `spec` with the channels' counts. Throws ConfigError, LogError, RobotError.
-RunOutcome RunInteractive(const RunSpec& spec, const Scenario& scenario,
-                          const std::string& scenario_text, const std::string& log,
-                          const InteractiveOptions& options);
+RunOutcome RunInteractive(const RunSpec& spec, const Scenario& scenario, const run_info_t& info,
+                          const std::string& log, const InteractiveOptions& options);
 
 }  // namespace poise

@@ -20,7 +20,6 @@
 #include "logging/recording/inline_recorder.h"
 #include "tools/cli/signals.h"
 #include "tools/run/stage_watch.h"
-#include "tools/scenario/registry.h"
 
 namespace poise {
 namespace {
@@ -61,17 +60,16 @@ void CountAllocations() {
   throw ConfigError(fmt::format("--count-allocations: {}", std::strerror(errno)));
 }
 
-RunOutcome RunInline(const RunSpec& spec, const std::string& scenario_text,
+RunOutcome RunInline(const RunSpec& spec, BoundGraph graph, const run_info_t& info,
                      const std::string& log_path, Progress* progress,
                      std::optional<logging::RunRecord>* record) {
   constexpr int64_t kFlushInterval = 50'000'000;  // ns
   // Ticks whose messages stay in memory, about 6 KB each with 12 joints, so that a run's checks
   // need not read the log back: that took a seventh of a short run.
   constexpr int64_t kMostKept = 30'000;
-  InlineRunner runner(spec, Components());
+  InlineRunner runner(spec, std::move(graph));
   const Counter counter = AllocationCounter();
   runner.CountAllocations(counter);
-  const run_info_t info = logging::MakeRunInfo(spec, scenario_text);
   std::optional<logging::InlineRecord> kept;
   if (record != nullptr && spec.num_ticks() > 0 && spec.num_ticks() <= kMostKept) {
     kept.emplace(spec, info, &runner);

@@ -4,17 +4,18 @@
 #include <optional>
 #include <string>
 
-#include "components/framework/graph.pb.h"
+#include "components/framework/graph.h"
 #include "logging/run_record.h"
+#include "poise/run_info_t.hpp"
 #include "tools/cli/progress.h"
 #include "tools/report/run_outcome.h"
 
 namespace poise {
 
-/// Runs to the end or until a stop signal, with the log in `log_path`; a run in real time is paced
-/// with the wall clock. `record`, where given, gets what ReadRun reads of the log, unless the run
-/// is so long that it is better read back. Throws ConfigError or LogError.
-RunOutcome RunInline(const RunSpec& spec, const std::string& scenario_text,
+/// Runs the components of `graph` to the end or until a stop signal, with the log in `log_path`; a
+/// run in real time is paced with the wall clock. `record`, where given, gets what ReadRun reads of
+/// the log, unless the run is so long that it is better read back. Throws ConfigError or LogError.
+RunOutcome RunInline(const RunSpec& spec, BoundGraph graph, const run_info_t& info,
                      const std::string& log_path, Progress* progress,
                      std::optional<logging::RunRecord>* record = nullptr);
 

@@ -12,6 +12,7 @@
 #include "components/framework/runners/timing.h"
 #include "fmt/format.h"
 #include "tools/cli/signals.h"
+#include "tools/run/run_dir.h"
 
 namespace poise {
 namespace {
@@ -29,11 +30,11 @@ constexpr std::string_view kWarning = "warning: ";  // begins a line that a user
 
 }  // namespace
 
-Launcher::Launcher(const RunSpec& spec, const RunSocket& socket, LaunchFiles files,
+Launcher::Launcher(const RunSpec& spec, const RunSocket& socket, std::filesystem::path dir,
                    const LaunchOptions& options, Progress* progress)
     : spec_(spec),
       socket_(socket),
-      files_(std::move(files)),
+      dir_(std::move(dir)),
       progress_(progress),
       control_(spec, &socket,
                options.log ? std::vector<std::string>{kRecorderName} : std::vector<std::string>{}),
@@ -62,13 +63,12 @@ void Launcher::StartProcesses() {
                          bool restart = false, std::vector<std::string> components = {}) {
     command[0] = FindProgram(command[0]).string();
     processes_.push_back(std::make_unique<ComponentProcess>(
-        name, command, fmt::format("{}/{}.log", files_.run_dir, name), restart, socket_,
-        std::move(components)));
+        name, command, dir_ / (name + ".log"), restart, socket_, std::move(components)));
   };
+  const std::string spec_file = dir_ / kSpecFile;
   if (log_) {
-    start(kRecorderName,
-          {"recorder", "--run", files_.spec_file, "--scenario", files_.scenario_file, "--log",
-           files_.run_dir + "/run.lcm", "--report", files_.run_dir + "/recorder.json"});
+    start(kRecorderName, {"recorder", "--run", spec_file, "--scenario", dir_ / kScenarioFile,
+                          "--log", dir_ / "run.lcm", "--report", dir_ / "recorder.json"});
   }
   // No process has a successor in lockstep, which would lack the messages of its tick; and the run
   // can be repeated.
@@ -78,10 +78,10 @@ void Launcher::StartProcesses() {
     for (const int i : ComponentsOf(graph, process)) names.push_back(graph.component(i).name());
     const ComponentInstance& first = graph.component(ComponentsOf(graph, process).front());
     const std::vector<std::string> command =
-        names.size() == 1 ? std::vector<std::string>{TypeOf(first), "--run", files_.spec_file,
-                                                     "--component", first.name()}
-                          : std::vector<std::string>{kHostProgram, "--run", files_.spec_file,
-                                                     "--process", process};
+        names.size() == 1
+            ? std::vector<std::string>{TypeOf(first), "--run", spec_file, "--component",
+                                       first.name()}
+            : std::vector<std::string>{kHostProgram, "--run", spec_file, "--process", process};
     start(process, command, spec_.realtime() && first.restart(), names);
   }
 }

@@ -1,6 +1,7 @@
 // Runs a graph as processes: starts, watches and ends them.
 #pragma once
 
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <string>
@@ -19,12 +20,6 @@
 
 namespace poise {
 
-struct LaunchFiles {
-  std::string run_dir;  ///< gets run.lcm, recorder.json and each process's output
-  std::string spec_file;
-  std::string scenario_file;
-};
-
 /// What else a run of processes may ask for.
 struct LaunchOptions {
   bool log = true;    ///< false: no recorder takes part
@@ -34,9 +29,10 @@ struct LaunchOptions {
 /// One run. Leaves no process behind, whatever happens.
 class Launcher {
  public:
-  /// `spec` as written to files.spec_file; `socket` and `progress` outlive the launcher. Throws
-  /// BusError, or ConfigError for faults that cannot be injected.
-  Launcher(const RunSpec& spec, const RunSocket& socket, LaunchFiles files,
+  /// `dir`: the run's folder, which holds its files (WriteRunFiles) and gets run.lcm, recorder.json
+  /// and each process's output. `socket` and `progress` outlive the launcher. Throws BusError, or
+  /// ConfigError for faults that cannot be injected.
+  Launcher(const RunSpec& spec, const RunSocket& socket, std::filesystem::path dir,
            const LaunchOptions& options, Progress* progress);
   ~Launcher();
 
@@ -67,7 +63,7 @@ class Launcher {
 
   RunSpec spec_;
   const RunSocket& socket_;
-  LaunchFiles files_;
+  const std::filesystem::path dir_;
   Progress* progress_;
   ControlClient control_;
   void MeasureMemory(int64_t now, int64_t start);

@@ -26,9 +26,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kFiles[] = {"run.lcm",        "run.lcm.crc32", "run.packed",
-                                  "summary.json",   "recorder.json", "run_spec.pbtxt",
-                                  "scenario.pbtxt", "report.html"};
+constexpr const char* kFiles[] = {"run.lcm",       "run.lcm.crc32", "run.packed",  "summary.json",
+                                  "recorder.json", kSpecFile,       kScenarioFile, "report.html"};
 
 /// The folder or log that `run` means. Throws ConfigError.
 fs::path FindRun(const std::string& run) {
@@ -121,6 +120,11 @@ RunDir MakeRunDir(const std::string& out, const std::string& name, bool force) {
                   (RunsDir() / dated).string(), error.message()));
 }
 
+void WriteRunFiles(const fs::path& dir, const run_info_t& info) {
+  WriteFile(dir / kSpecFile, info.run_spec);
+  WriteFile(dir / kScenarioFile, info.scenario);
+}
+
 int64_t RemoveRun(const RunDir& run) {
   const fs::path& dir = run.path();
   std::vector<std::string> files(std::begin(kFiles), std::end(kFiles));
@@ -186,7 +190,7 @@ void WarnOfRunInfo(const fs::path& log) {
 RunSpec ReadRunSpec(const std::string& run) {
   fs::path path = FindRun(run);
   if (!fs::is_directory(path)) path = path.parent_path();
-  path /= "run_spec.pbtxt";
+  path /= kSpecFile;
   RunSpec spec;
   ReadTextProto(path.string(), &spec);
   return spec;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "components/framework/graph.pb.h"
+#include "poise/run_info_t.hpp"
 
 namespace poise {
 
@@ -37,6 +38,13 @@ class RunDir {
 /// `name`. An `out` that holds anything is refused; `force` removes an earlier run's files from it
 /// and leaves the rest. Throws ConfigError.
 RunDir MakeRunDir(const std::string& out, const std::string& name, bool force);
+
+inline constexpr char kSpecFile[] = "run_spec.pbtxt";
+inline constexpr char kScenarioFile[] = "scenario.pbtxt";
+
+/// Writes what describes a run into its folder: the texts of its spec and of its scenario. Throws
+/// ConfigError.
+void WriteRunFiles(const std::filesystem::path& dir, const run_info_t& info);
 
 /// Removes the files that runs write into `dir`, and the folder where nothing else is in it.
 /// Returns the bytes that this frees. Throws ConfigError when its run cannot be told.

@@ -1,7 +1,5 @@
 #include "tools/run/scenario_run.h"
 
-#include <google/protobuf/text_format.h>
-
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -13,6 +11,7 @@
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "logging/printable.h"
+#include "logging/run_log_writer.h"
 #include "tools/cli/child_process.h"
 #include "tools/cli/progress.h"
 #include "tools/cli/signals.h"
@@ -25,15 +24,12 @@
 #include "tools/run/run_registry.h"
 #include "tools/scenario/described_components.h"
 #include "tools/scenario/former_fields.h"
-#include "tools/scenario/run_setup.h"
 
 namespace poise {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kSpecFile[] = "run_spec.pbtxt";
-constexpr char kScenarioFile[] = "scenario.pbtxt";
 constexpr char kRos2Log[] = "ros2.log";
 constexpr std::chrono::seconds kRos2End{5};  // that it may take to tell the run's last messages
 constexpr std::chrono::milliseconds kRos2Look{10};
@@ -91,44 +87,34 @@ ScenarioRun::ScenarioRun(const std::string& scenario, const RunOptions& options)
                        /*in_process=*/true, false);
 }
 
-ScenarioRun::Part ScenarioRun::Prepare(const std::string& scenario, const RunChanges& changes,
-                                       bool in_process, bool warn) const {
-  Part part{LoadScenario(scenario, changes), {}};
-  std::vector<std::string> warnings;
-  part.spec = MakeRunSpec(part.loaded, changes, &warnings);
-  part.spec.set_recorded(!in_process && options_.launch.log);
+RunSetup ScenarioRun::Prepare(const std::string& scenario, const RunChanges& changes,
+                              bool in_process, bool warn) const {
+  RunSetup setup = SetUpRun(scenario, changes);
+  setup.spec.set_recorded(!in_process && options_.launch.log);
+  if (!in_process) setup.graph.reset();  // each process makes its own components
   if (warn) {
-    for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
+    for (const std::string& text : setup.warnings) fmt::print(stderr, "warning: {}\n", text);
   }
-  CheckRun(part.loaded, &part.spec);
-  const std::string program = in_process ? OwnProgramOf(part.spec.graph()) : "";
+  const std::string program = in_process ? OwnProgramOf(setup.spec.graph()) : "";
   if (!program.empty()) {
     throw ConfigError(fmt::format(
         "{}, which a run inside one process cannot hold; {}", program,
         warn ? "poise run without --inline and --interactive makes each component a process"
              : "the reference variant is run so: leave it out with --no-reference"));
   }
-  return part;
+  return setup;
 }
 
-void ScenarioRun::WriteFiles(const Part& part, const fs::path& dir) {
-  std::string text;
-  google::protobuf::TextFormat::PrintToString(part.spec, &text);
-  WriteFile(dir / kSpecFile, text);
-  WriteFile(dir / kScenarioFile, ScenarioText(part.loaded.scenario));
-}
-
-RunOutcome ScenarioRun::RunPart(const Part& part, const fs::path& dir, const RunSocket* socket,
-                                bool quiet, const LaunchOptions& launch,
+RunOutcome ScenarioRun::RunPart(RunSetup* setup, const run_info_t& info, const fs::path& dir,
+                                const RunSocket* socket, bool quiet, const LaunchOptions& launch,
                                 std::optional<logging::RunRecord>* record) {
-  const RunSpec& spec = part.spec;
+  const RunSpec& spec = setup->spec;
   Progress progress(static_cast<double>(spec.num_ticks() - spec.lead_ticks()) * spec.tick_period(),
                     quiet, static_cast<double>(spec.lead_ticks()) * spec.tick_period());
   if (socket == nullptr) {
-    return RunInline(spec, ScenarioText(part.loaded.scenario), dir / "run.lcm", &progress, record);
+    return RunInline(spec, std::move(*setup->graph), info, dir / "run.lcm", &progress, record);
   }
-  const LaunchFiles files{dir.string(), (dir / kSpecFile).string(), (dir / kScenarioFile).string()};
-  return Launcher(spec, *socket, files, launch, &progress).Run();
+  return Launcher(spec, *socket, dir, launch, &progress).Run();
 }
 
 void ScenarioRun::PrintHeading() const {
@@ -227,7 +213,8 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   const RunDir dir = MakeRunDir(out, name(), options_.force);
   result.dir = dir.path();
   // Also what runs after its reference can be found and watched from here on.
-  WriteFiles(main_, result.dir);
+  run_info_t info = logging::MakeRunInfo(main_.spec, ScenarioText(scenario));
+  WriteRunFiles(result.dir, info);
   if (latest) PointLatestTo(result.dir);
   const RunRegistration registration(result.dir);
   if (!options_.quiet) PrintHeading();
@@ -240,9 +227,11 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   summary.mode = options_.in_process ? "inline" : "processes";
   if (reference_) {
     const RunDir reference = MakeRunDir(ReferenceDir(result.dir).string(), name(), true);
-    WriteFiles(*reference_, reference.path());
+    const run_info_t its =
+        logging::MakeRunInfo(reference_->spec, ScenarioText(reference_->loaded.scenario));
+    WriteRunFiles(reference.path(), its);
     summary.reference =
-        RunPart(*reference_, reference.path(), /*socket=*/nullptr, /*quiet=*/true, {});
+        RunPart(&*reference_, its, reference.path(), /*socket=*/nullptr, /*quiet=*/true, {});
     PrintOutcome(fmt::format("reference run (variant {})", scenario.reference()),
                  *summary.reference);
   }
@@ -250,10 +239,10 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   if (StopSignal() == 0) {
     std::optional<ChildProcess> ros2;
     if (options_.ros2) ros2.emplace("ros2", Ros2Command(result.dir), result.dir / kRos2Log);
+    info.started_at = logging::TimeNow();  // which the reference has taken some of
     summary.outcome = options_.interactive
-                          ? options_.interactive(main_.spec, scenario, ScenarioText(scenario),
-                                                 result.dir / "run.lcm")
-                          : RunPart(main_, result.dir, source ? &source->socket() : nullptr,
+                          ? options_.interactive(main_.spec, scenario, info, result.dir / "run.lcm")
+                          : RunPart(&main_, info, result.dir, source ? &source->socket() : nullptr,
                                     options_.quiet, options_.launch, &kept);
     if (ros2) EndRos2(&*ros2);
     PrintOutcome("run", summary.outcome);
@@ -313,9 +302,10 @@ RunOutcome ScenarioRun::RunOnly(const std::string& out) {
   std::optional<RunSource> source;
   if (!options_.in_process) source.emplace(ChoosePorts(main_.loaded.scenario, &main_.spec));
   const RunDir dir = MakeRunDir(out, name(), options_.force);
-  WriteFiles(main_, dir.path());
+  const run_info_t info = logging::MakeRunInfo(main_.spec, ScenarioText(scenario()));
+  WriteRunFiles(dir.path(), info);
   CatchStopSignals();
-  return RunPart(main_, dir.path(), source ? &source->socket() : nullptr, /*quiet=*/true,
+  return RunPart(&main_, info, dir.path(), source ? &source->socket() : nullptr, /*quiet=*/true,
                  options_.launch);
 }
 

@@ -7,10 +7,11 @@
 #include <string>
 
 #include "components/framework/graph.pb.h"
+#include "poise/run_info_t.hpp"
 #include "tools/cli/output_place.h"
 #include "tools/report/report.h"
 #include "tools/run/launcher.h"
-#include "tools/scenario/scenario_loading.h"
+#include "tools/scenario/run_setup.h"
 
 namespace poise {
 
@@ -27,8 +28,8 @@ struct RunOptions {
   bool ros2 = false;  ///< `poise ros2` listens to the run of processes, and ends with it
   /// Runs in this process in place of RunInline and writes the log named, for a caller that lets a
   /// page control it; empty: RunInline does.
-  std::function<RunOutcome(const RunSpec& spec, const Scenario& scenario,
-                           const std::string& scenario_text, const std::string& log)>
+  std::function<RunOutcome(const RunSpec& spec, const Scenario& scenario, const run_info_t& info,
+                           const std::string& log)>
       interactive;
 };
 
@@ -39,7 +40,7 @@ struct RunResult {
   std::string problem;  ///< why nothing could be run or read; empty: it could
 };
 
-/// A checked scenario, ready to run, with its reference variant.
+/// A checked scenario, ready to run once, with its reference variant.
 class ScenarioRun {
  public:
   /// Throws ConfigError or RobotError; what is odd about the robot goes to stderr.
@@ -61,17 +62,12 @@ class ScenarioRun {
   LogSizes log_sizes() const;
 
  private:
-  /// One run of a graph.
-  struct Part {
-    LoadedScenario loaded;
-    RunSpec spec;
-  };
-  Part Prepare(const std::string& scenario, const RunChanges& changes, bool in_process,
-               bool warn) const;
-  static void WriteFiles(const Part& part, const std::filesystem::path& dir);
-  /// Inside this process without a `socket`.
-  static RunOutcome RunPart(const Part& part, const std::filesystem::path& dir,
-                            const RunSocket* socket, bool quiet, const LaunchOptions& launch,
+  RunSetup Prepare(const std::string& scenario, const RunChanges& changes, bool in_process,
+                   bool warn) const;
+  /// `dir` has the run's files, and so `info`. Inside this process without a `socket`.
+  static RunOutcome RunPart(RunSetup* setup, const run_info_t& info,
+                            const std::filesystem::path& dir, const RunSocket* socket, bool quiet,
+                            const LaunchOptions& launch,
                             std::optional<logging::RunRecord>* record = nullptr);
   void PrintHeading() const;
   /// What happened, the table, the verdict, where to look next.
@@ -79,8 +75,8 @@ class ScenarioRun {
 
   const std::string scenario_;  // as it was named
   RunOptions options_;
-  Part main_;
-  std::optional<Part> reference_;
+  RunSetup main_;
+  std::optional<RunSetup> reference_;
 };
 
 /// Makes a record, read from `log`, ready for the scenario's checks: its first_tick, and its

@@ -382,13 +382,13 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
   return spec;
 }
 
-void CheckRun(const LoadedScenario& loaded, RunSpec* spec) {
+BoundGraph ConfigureRun(const LoadedScenario& loaded, RunSpec* spec) {
   CheckSharedProcesses(spec->graph());
   try {
-    CheckGraph(spec->graph(), Components());
     ConfigureWatch watch(*spec);
-    const BoundGraph bound(*spec, Components(), watch.configuring());
-    FillPlan(bound.plan(), spec->mutable_graph());
+    BoundGraph graph(*spec, Components(), watch.configuring());
+    FillPlan(graph.plan(), spec->mutable_graph());
+    return graph;
   } catch (const GraphError& error) {
     FailGraph(loaded.graph_file, error);
   } catch (const ConfigError& error) {
@@ -405,6 +405,13 @@ void CheckRun(const LoadedScenario& loaded, RunSpec* spec) {
     }
     FailField(loaded, field, error.problem());
   }
+}
+
+RunSetup SetUpRun(const std::string& scenario, const RunChanges& changes) {
+  RunSetup setup{LoadScenario(scenario, changes), {}, {}, {}};
+  setup.spec = MakeRunSpec(setup.loaded, changes, &setup.warnings);
+  setup.graph = ConfigureRun(setup.loaded, &setup.spec);
+  return setup;
 }
 
 void CheckGraphFile(const std::string& path) {

@@ -1,8 +1,10 @@
 // From a scenario to a checked run, in one direction: LoadScenario reads the files and changes the
-// scenario as a message, MakeRunSpec writes of it the text that each component reads, and CheckRun
-// has each read it. Only what a log holds is text to begin with (ChangeConfigurations).
+// scenario as a message, MakeRunSpec writes of it the text that each component reads, and
+// ConfigureRun has each read it; who runs inside this process runs these components. Only what a
+// log holds is text to begin with (ChangeConfigurations).
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,9 +29,20 @@ std::string EngineOfField(const std::string& field);
 
 /// Makes and configures every component, checks the graph and fills in the channels' counts.
 /// Throws ConfigError with one line per problem, each with file, line and field.
-void CheckRun(const LoadedScenario& loaded, RunSpec* spec);
+BoundGraph ConfigureRun(const LoadedScenario& loaded, RunSpec* spec);
 
-/// The lines that CheckRun would throw for a graph on its own, without a scenario.
+/// A run that is checked and has not begun.
+struct RunSetup {
+  LoadedScenario loaded;
+  RunSpec spec;
+  std::optional<BoundGraph> graph;  ///< its components, for who runs them inside this process
+  std::vector<std::string> warnings;
+};
+
+/// The whole way. Throws as LoadScenario, MakeRunSpec and ConfigureRun do.
+RunSetup SetUpRun(const std::string& scenario, const RunChanges& changes);
+
+/// The lines that ConfigureRun would throw for a graph on its own, without a scenario.
 void CheckGraphFile(const std::string& path);
 
 /// Whether a run of the scenario has the port.

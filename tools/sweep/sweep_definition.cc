@@ -330,9 +330,10 @@ SweepDefinition::SweepDefinition(const SweepArguments& arguments, bool limit)
   Scenario base = LoadScenario(scenario_, changes_).scenario;
   CheckFields(source, base, first_limit);
   const RunChanges first = ChangesOf(0, first_limit);
-  const LoadedScenario loaded = LoadScenario(scenario_, first);
-  RunSpec spec = MakeRunSpec(loaded, first, &warnings_);
-  CheckRun(loaded, &spec);
+  const RunSetup setup = SetUpRun(scenario_, first);
+  const LoadedScenario& loaded = setup.loaded;
+  const RunSpec& spec = setup.spec;
+  warnings_ = setup.warnings;
   log_size_ = ExpectedLogSize(spec);
 
   SetColumns(source, loaded.scenario);

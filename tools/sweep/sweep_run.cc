@@ -1,13 +1,12 @@
 #include "tools/sweep/sweep_run.h"
 
-#include <google/protobuf/text_format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <utility>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/runners/inline_runner.h"
@@ -18,7 +17,6 @@
 #include "logging/metrics/schedule_plan.h"
 #include "logging/recording/inline_record.h"
 #include "logging/recording/inline_recorder.h"
-#include "tools/cli/output_place.h"
 #include "tools/cli/temporary_dir.h"
 #include "tools/cli/text_table.h"
 #include "tools/report/fall_story.h"
@@ -26,7 +24,6 @@
 #include "tools/run/run_dir.h"
 #include "tools/run/scenario_run.h"
 #include "tools/scenario/described_components.h"
-#include "tools/scenario/registry.h"
 #include "tools/scenario/run_setup.h"
 
 namespace poise {
@@ -34,11 +31,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
-
-struct Prepared {
-  LoadedScenario loaded;
-  RunSpec spec;
-};
 
 /// Whether one process cannot hold the run.
 bool NeedsProcesses(const RunSpec& spec, const RunChanges& changes) {
@@ -70,15 +62,15 @@ std::optional<logging::RunRecord> RecordOfProcesses(const std::string& scenario,
 }
 
 /// Runs to the end and takes the record, from memory or from the log in `log_dir`.
-logging::RunRecord Record(const Prepared& prepared, const std::string& log_dir, TaskStatus* status,
+logging::RunRecord Record(RunSetup* setup, const std::string& log_dir, TaskStatus* status,
                           SweepRow* row) {
-  const std::string text = ScenarioText(prepared.loaded.scenario);
-  InlineRunner runner(prepared.spec, Components());
+  const RunSpec& spec = setup->spec;
+  InlineRunner runner(spec, std::move(*setup->graph));
   std::vector<std::pair<std::string, std::string>> stages;
   for (const InlineRunner::StageName& name : runner.StageNames()) {
     stages.emplace_back(name.component, name.stage);
   }
-  status->SetRun(stages, prepared.spec.tick_period(), prepared.spec.lead_ticks());
+  status->SetRun(stages, spec.tick_period(), spec.lead_ticks());
   runner.set_position(status->position());
   const auto run = [&] {
     while (runner.Step()) {
@@ -88,21 +80,19 @@ logging::RunRecord Record(const Prepared& prepared, const std::string& log_dir, 
         std::min(runner.end_detail().size(),
                  row->component.empty() ? 0 : row->component.size() + std::strlen(": ")));
   };
+  const std::string text = ScenarioText(setup->loaded.scenario);
   if (log_dir.empty()) {
-    logging::InlineRecord record(prepared.spec, text, &runner);
+    logging::InlineRecord record(spec, text, &runner);
     run();
     return record.Take();
   }
-  const RunDir dir = MakeRunDir(log_dir, prepared.spec.scenario(), /*force=*/true);
-  std::string spec;
-  google::protobuf::TextFormat::PrintToString(prepared.spec, &spec);
-  WriteFile(dir.path() / "run_spec.pbtxt", spec);
-  WriteFile(dir.path() / "scenario.pbtxt", text);
+  const RunDir dir = MakeRunDir(log_dir, spec.scenario(), /*force=*/true);
+  const run_info_t info = logging::MakeRunInfo(spec, text);
+  WriteRunFiles(dir.path(), info);
   const fs::path log = dir.path() / "run.lcm";
-  logging::InlineRecorder recorder(log, prepared.spec, logging::MakeRunInfo(prepared.spec, text),
-                                   &runner);
+  logging::InlineRecorder recorder(log, spec, info, &runner);
   run();
-  recorder.Close(prepared.spec);
+  recorder.Close(spec);
   return logging::ReadRun(log);
 }
 
@@ -150,12 +140,9 @@ void Judge(const Scenario& scenario, const std::vector<std::string>& required,
 SweepRow RunPoint(const std::string& scenario, const RunChanges& changes,
                   const std::vector<std::string>& metrics, const std::vector<std::string>& required,
                   const std::string& log_dir, SweepRow row, TaskStatus* status) {
-  std::optional<Prepared> prepared;
+  std::optional<RunSetup> setup;
   try {
-    LoadedScenario loaded = LoadScenario(scenario, changes);
-    RunSpec spec = MakeRunSpec(loaded, changes, nullptr);
-    CheckRun(loaded, &spec);
-    prepared.emplace(Prepared{std::move(loaded), std::move(spec)});
+    setup.emplace(SetUpRun(scenario, changes));
   } catch (const ConfigError& error) {
     row.outcome = kInvalid;
     row.reason = error.what();
@@ -165,14 +152,15 @@ SweepRow RunPoint(const std::string& scenario, const RunChanges& changes,
     row.reason = error.what();
     return row;
   }
-  const Scenario& merged = prepared->loaded.scenario;
+  const Scenario& merged = setup->loaded.scenario;
   std::optional<logging::RunRecord> record;
-  if (NeedsProcesses(prepared->spec, changes)) {
+  if (NeedsProcesses(setup->spec, changes)) {
     status->SetWatchedElsewhere();  // by the launcher
+    setup->graph.reset();
     record = RecordOfProcesses(scenario, changes, log_dir, &row);
     if (!record) return row;
   } else {
-    record = Record(*prepared, log_dir, status, &row);
+    record = Record(&*setup, log_dir, status, &row);
   }
   logging::RunRecord& run = *record;
   status->Step();

@@ -1,6 +1,7 @@
 #include "components/framework/runners/inline_runner.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "components/framework/bus/owned_message.h"
 #include "components/framework/clock.h"
@@ -39,11 +40,14 @@ struct InlineRunner::BoundStage {
 };
 
 InlineRunner::InlineRunner(const RunSpec& spec, const ComponentRegistry& registry)
+    : InlineRunner(spec, BoundGraph(spec, registry)) {}
+
+InlineRunner::InlineRunner(const RunSpec& spec, BoundGraph graph)
     : run_id_(spec.run_id()),
       period_(spec.tick_period()),
       lead_(spec.lead_ticks()),
       num_ticks_(spec.num_ticks()),
-      graph_(spec, registry),
+      graph_(std::move(graph)),
       latency_(static_cast<size_t>(graph_.num_components())) {
   const GraphPlan& plan = graph_.plan();
   const auto output_of = [&](int channel) {

@@ -27,6 +27,8 @@ class InlineRunner {
 
   /// Makes, configures and checks all components. Throws GraphError or ConfigError.
   InlineRunner(const RunSpec& spec, const ComponentRegistry& registry);
+  /// Runs the components of `graph`, which was made of `spec` and has not run yet.
+  InlineRunner(const RunSpec& spec, BoundGraph graph);
   ~InlineRunner();
 
   void set_tap(Tap tap) { tap_ = std::move(tap); }
