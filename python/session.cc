@@ -143,7 +143,7 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
   LoadModules();
   Components();
   const LoadedScenario loaded = LoadScenario(options.scenario, options.changes);
-  spec_ = MakeRunSpec(loaded, options.changes, &warnings_);
+  spec_ = MakeRunSpec(loaded, options.changes);
   if (options.endless) spec_.set_num_ticks(0);
   scenario_ = ScenarioText(loaded.scenario);
   const bool replaces = !options.replaced.empty() || options.plant;
@@ -159,6 +159,7 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
   // Where nothing is replaced, an error names file and line.
   BoundGraph graph = replaces ? BoundGraph(spec_, registry) : ConfigureRun(loaded, &spec_);
   FillPlan(graph.plan(), spec_.mutable_graph());
+  warnings_ = WarningsOf(spec_, graph);
   runner_ = std::make_unique<InlineRunner>(spec_, std::move(graph));
   names_ = logging::ElementNames::OfSpec(spec_);
   for (int i = 0; i < runner_->graph().num_components(); ++i) {

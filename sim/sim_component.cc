@@ -1,5 +1,9 @@
 #include "sim/sim_component.h"
 
+#include <fmt/format.h>
+
+#include <cmath>
+
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
 
@@ -48,6 +52,14 @@ void SimComponent::Configure(const ComponentContext& context, Wiring* wiring) {
   } catch (const ConfigError& error) {
     if (error.field().empty()) throw;
     throw ConfigError("sim." + error.field(), error.problem());
+  }
+  const int64_t ticks = context.num_ticks - context.lead_ticks;  // of the scenario's own time
+  for (int i = 0; i < setup.sim.push_size() && context.num_ticks > 0; ++i) {
+    const double start = setup.sim.push(i).start();
+    if (std::llround(start / context.tick_period) < ticks) continue;
+    wiring->AddWarning(
+        fmt::format("sim.push[{}].start: {:g} s is after the run's end, {:g} s: it does not push",
+                    i, start, static_cast<double>(ticks) * context.tick_period));
   }
   readings_ = std::make_unique<SensorReadings>(model->num_joints());
   for (const robot::MotorModel& motor : model->motors()) {

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 #include <typeindex>
+#include <utility>
 #include <vector>
 
 #include "components/framework/component_traits.h"
@@ -66,6 +67,7 @@ struct ComponentContext {
   std::string config_text;  ///< protobuf text of the component's own configuration message
   double tick_period = 0;   ///< s
   int64_t lead_ticks = 0;   ///< before the scenario's time 0
+  int64_t num_ticks = 0;    ///< of the run, the lead's with them; 0: it has no planned end
   uint64_t seed = 0;  ///< of this instance: the run's seed mixed with `name`, or its seed_name
   const std::map<std::string, std::string>* resources = nullptr;  ///< "robot", "urdf": text by name
   SharedObjects* shared = nullptr;
@@ -95,9 +97,10 @@ struct Stage {
   double deadline = 1;
 };
 
-/// Collects the ports and stages that a component declares in Configure. Port names are unique per
-/// direction. All Add functions throw ConfigError on a declaration that cannot work (wrong number
-/// of counts, a stage without ports of this wiring, an output in two stages).
+/// Collects what a component declares in Configure: ports, stages, warnings. Port names are unique
+/// per direction. The functions that add a port or a stage throw ConfigError on a declaration that
+/// cannot work (wrong number of counts, a stage without ports of this wiring, an output in two
+/// stages).
 class Wiring {
  public:
   /// `port` must outlive the wiring (it is a member of the component).
@@ -108,15 +111,20 @@ class Wiring {
   /// several. `deadline`: see Stage, 0 to 1.
   void AddStage(std::string name, std::vector<InputPort*> inputs, std::vector<OutputPort*> outputs,
                 std::function<void(const Tick&)> run, double deadline = 1);
+  /// Says what is odd about a configuration that works all the same. `text` begins with the field:
+  /// "walk.command has no effect without walk.enabled=true". Who starts the run tells of it.
+  void AddWarning(std::string text) { warnings_.push_back(std::move(text)); }
 
   const std::vector<InputPort*>& inputs() const { return inputs_; }
   const std::vector<OutputPort*>& outputs() const { return outputs_; }
   const std::vector<Stage>& stages() const { return stages_; }
+  const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
   std::vector<InputPort*> inputs_;
   std::vector<OutputPort*> outputs_;
   std::vector<Stage> stages_;
+  std::vector<std::string> warnings_;
 };
 
 /// A component sees no bus, no clock and no file. The same object runs in its own process, inside

@@ -510,6 +510,7 @@ ConfiguredComponent ConfigureComponent(const RunSpec& spec, int index,
   }
   context.tick_period = spec.tick_period();
   context.lead_ticks = spec.lead_ticks();
+  context.num_ticks = spec.num_ticks();
   context.seed =
       InstanceSeed(spec.seed(), instance.has_seed_name() ? instance.seed_name() : result.name);
   std::map<std::string, std::string> resources;

@@ -16,20 +16,29 @@ namespace {
 RunSpec SpecOf(const std::string& scenario, const std::vector<std::string>& set) {
   RunChanges changes;
   changes.set = set;
-  std::vector<std::string> warnings;
-  return MakeRunSpec(LoadScenario(scenario, changes), changes, &warnings);
+  return MakeRunSpec(LoadScenario(scenario, changes), changes);
 }
 
-TEST(MakeRunSpec, WarnsOfAPushAfterTheRunsEnd) {
+bool Warns(const std::string& scenario, const std::string& set, const std::string& beginning) {
+  RunChanges changes;
+  changes.set = {set};
+  return std::ranges::any_of(SetUpRun(scenario, changes).warnings,
+                             [&](const std::string& text) { return text.starts_with(beginning); });
+}
+
+TEST(SetUpRun, WarnsOfAPushAfterTheRunsEnd) {
   for (const auto& [start, warned] : {std::pair{"2.9", false}, {"3", true}, {"10", true}}) {
-    RunChanges changes;
-    changes.set = {std::string("sim.push[0].start=") + start};
-    std::vector<std::string> warnings;
-    MakeRunSpec(LoadScenario("push_double_support", changes), changes, &warnings);
-    const bool said = std::ranges::any_of(
-        warnings, [](const std::string& text) { return text.starts_with("sim.push[0].start: "); });
-    EXPECT_EQ(said, warned) << start;
+    EXPECT_EQ(Warns("push_double_support", fmt::format("sim.push[0].start={}", start),
+                    "sim.push[0].start: "),
+              warned)
+        << start;
   }
+}
+
+TEST(SetUpRun, WarnsOfACommandToWalkThatNobodyFollows) {
+  const std::string command = "step_planner.walk.command has no effect";
+  EXPECT_FALSE(Warns("walk", "step_planner.walk.enabled=true", command));
+  EXPECT_TRUE(Warns("walk", "step_planner.walk.enabled=false", command));
 }
 
 // Else emulated drives of two runs would answer each other's bridge, or a robot's.
@@ -38,7 +47,7 @@ TEST(ChoosePorts, GivesBothEndsOfEmulatedDrivesWhatIsThisRunsAlone) {
     RunChanges changes;
     changes.drives = drives;
     const LoadedScenario loaded = LoadScenario("stand", changes);
-    RunSpec spec = MakeRunSpec(loaded, changes, nullptr);
+    RunSpec spec = MakeRunSpec(loaded, changes);
     const RunSpec before = spec;
     const RunSource source = ChoosePorts(loaded.scenario, &spec);
     const std::string own =

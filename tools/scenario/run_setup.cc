@@ -21,7 +21,6 @@
 #include "components/framework/optional_ports.h"
 #include "components/framework/run.h"
 #include "components/robot_files/robot_files.h"
-#include "components/step_planner/walk_config.h"
 #include "fmt/format.h"
 #include "tools/scenario/catalog.h"
 #include "tools/scenario/configure_watch.h"
@@ -333,8 +332,7 @@ std::string EngineOfField(const std::string& field) {
   return "";
 }
 
-RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
-                    std::vector<std::string>* warnings) {
+RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes) {
   const Scenario& scenario = loaded.scenario;
   RunSpec spec;
   std::random_device random;
@@ -355,20 +353,7 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
                                                                            scenario.tick_rate())));
   WriteConfigs(scenario, &spec);
   const robot::RobotFiles robot = robot::ReadRobotFiles(loaded.robot_file);
-  const robot::RobotModel model = robot.Model();
-  if (warnings != nullptr) {
-    for (int i = 0; i < scenario.sim().push_size(); ++i) {
-      const double start = scenario.sim().push(i).start();
-      if (start < scenario.duration() || scenario.duration() == 0) continue;
-      warnings->push_back(
-          fmt::format("sim.push[{}].start: {} s is after the run's end, {} s: it "
-                      "does not push",
-                      i, start, scenario.duration()));
-    }
-    for (const std::string& text : WalkWarnings(scenario.step_planner().walk(), model)) {
-      warnings->push_back("step_planner." + text);
-    }
-  }
+  robot.Model();  // whose errors name the file, as those of components do not
   AddResource(&spec, "robot", robot.file, robot.text);
   AddResource(&spec, "urdf", robot.maker_file, robot.maker_text);
   spec.set_realtime(changes.realtime);
@@ -407,10 +392,21 @@ BoundGraph ConfigureRun(const LoadedScenario& loaded, RunSpec* spec) {
   }
 }
 
+std::vector<std::string> WarningsOf(const RunSpec& spec, const BoundGraph& graph) {
+  std::vector<std::string> warnings;
+  for (int i = 0; i < graph.num_components(); ++i) {
+    for (const std::string& text : graph.component(i).wiring.warnings()) {
+      warnings.push_back(ScenarioPath(TypeOf(spec.graph().component(i)), text));
+    }
+  }
+  return warnings;
+}
+
 RunSetup SetUpRun(const std::string& scenario, const RunChanges& changes) {
   RunSetup setup{LoadScenario(scenario, changes), {}, {}, {}};
-  setup.spec = MakeRunSpec(setup.loaded, changes, &setup.warnings);
+  setup.spec = MakeRunSpec(setup.loaded, changes);
   setup.graph = ConfigureRun(setup.loaded, &setup.spec);
+  setup.warnings = WarningsOf(setup.spec, *setup.graph);
   return setup;
 }
 

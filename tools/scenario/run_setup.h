@@ -18,10 +18,8 @@ namespace poise {
 
 /// Builds the run: a random 63-bit run_id, configurations by component, robot and URDF, versions.
 /// No ports yet. Throws ConfigError, also for a change of another engine's field, or RobotError
-/// when the robot's files cannot work; what is odd about them, and what of a walk's
-/// settings the robot will not do, goes to `warnings`.
-RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
-                    std::vector<std::string>* warnings);
+/// when the robot's files cannot work.
+RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes);
 
 /// The engine that a scenario's field is for, "mujoco" of "mujoco.contact_softness=1e-6"; empty: it
 /// is for none alone.
@@ -31,12 +29,16 @@ std::string EngineOfField(const std::string& field);
 /// Throws ConfigError with one line per problem, each with file, line and field.
 BoundGraph ConfigureRun(const LoadedScenario& loaded, RunSpec* spec);
 
+/// What the components say is odd about their configurations (Wiring::AddWarning), by the
+/// scenario's fields.
+std::vector<std::string> WarningsOf(const RunSpec& spec, const BoundGraph& graph);
+
 /// A run that is checked and has not begun.
 struct RunSetup {
   LoadedScenario loaded;
   RunSpec spec;
-  std::optional<BoundGraph> graph;  ///< its components, for who runs them inside this process
-  std::vector<std::string> warnings;
+  std::optional<BoundGraph> graph;    ///< its components, for who runs them inside this process
+  std::vector<std::string> warnings;  ///< of WarningsOf
 };
 
 /// The whole way. Throws as LoadScenario, MakeRunSpec and ConfigureRun do.
