@@ -176,6 +176,39 @@ TEST(SetField, AnEmptyTextClearsAListOrAGroup) {
   EXPECT_NE(SetError("phase[0]", "").find("group of fields"), std::string::npos);
 }
 
+TEST(FieldsByPath, AreCountedClearedAndMade) {
+  ToyConfig config;
+  ParseTextProto("gains { kp: 3 } phase { kp: 8 } phase { kp: 9 } fail: true", "config", &config);
+  for (const auto& [path, count] : {std::pair{"gains", 1},
+                                    {"gains.kp", 1},
+                                    {"gains.kd", 0},
+                                    {"phase", 2},
+                                    {"phase[1]", 1},
+                                    {"phase[2]", 0},
+                                    {"phase[1].kp", 1},
+                                    {"phase.kp", 1},
+                                    {"phase[2].kp", 0},
+                                    {"weight", 0},
+                                    {"gains.kp.kp", 0},
+                                    {"nothing", 0},
+                                    {"phase[name].kp", 0},
+                                    {"", 0}}) {
+    EXPECT_EQ(CountField(config, path), count) << path;
+    EXPECT_EQ(HasField(config, path), count > 0) << path;
+  }
+  for (const char* path : {"fail", "gains"}) EXPECT_TRUE(IsTrue(config, path)) << path;
+  for (const char* path : {"gains.kp", "phase", "nothing"})
+    EXPECT_FALSE(IsTrue(config, path)) << path;
+  for (const char* path : {"phase[0]", "phase.kp", "gains.kd", "nothing"}) {
+    EXPECT_FALSE(ClearField(&config, path)) << path;
+  }
+  for (const char* path : {"gains.kp", "phase", "fail"}) {
+    EXPECT_TRUE(ClearField(&config, path)) << path;
+    EXPECT_FALSE(HasField(config, path)) << path;
+  }
+  EXPECT_EQ(MutableGroup(&config, "gains"), config.mutable_gains());
+}
+
 TEST(SetField, AFailedAppendLeavesTheListAsItWas) {
   ToyConfig config;
   EXPECT_NE(ErrorOf([&] { SetField(&config, "weight[0]", "heavy"); }), "no error");

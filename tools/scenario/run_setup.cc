@@ -17,6 +17,7 @@
 #include "components/framework/build_info.h"
 #include "components/framework/configuration/added_fields.h"
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_path.h"
 #include "components/framework/configuration/suggest.h"
 #include "components/framework/optional_ports.h"
 #include "components/framework/run.h"
@@ -109,24 +110,6 @@ std::string ScenarioPath(const std::string& type, const std::string& field) {
   const std::vector<std::string> sections = SectionsOf(type);
   if (sections.size() > 1) return field;
   return field.empty() ? sections[0] : sections[0] + "." + field;
-}
-
-/// Whether a setting, "step_planner.walk.enabled", is true, or a group is set.
-bool IsTrue(const google::protobuf::Message& message, const std::string& path) {
-  const size_t dot = path.find('.');
-  const FieldDescriptor* field = FindField(*message.GetDescriptor(), path.substr(0, dot));
-  if (field == nullptr || field->is_repeated()) return false;
-  const google::protobuf::Reflection& reflection = *message.GetReflection();
-  if (dot == std::string::npos) {
-    return field->cpp_type() == FieldDescriptor::CPPTYPE_BOOL ? reflection.GetBool(message, field)
-           : field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE
-               ? reflection.HasField(message, field)
-               : false;
-  }
-  // A group that is not set has no settings, whatever their defaults are.
-  return field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE &&
-         reflection.HasField(message, field) &&
-         IsTrue(reflection.GetMessage(message, field), path.substr(dot + 1));
 }
 
 std::string InCapitals(std::string name) {

@@ -1,13 +1,11 @@
 #include "tools/scenario/scenario_files.h"
 
-#include <google/protobuf/message.h>
-
 #include <algorithm>
 #include <charconv>
 #include <optional>
 
-#include "components/framework/configuration/added_fields.h"
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_path.h"
 #include "fmt/format.h"
 #include "tools/scenario/catalog.h"
 #include "tools/scenario/former_fields.h"
@@ -16,62 +14,6 @@ namespace poise {
 namespace {
 
 namespace fs = std::filesystem;
-using google::protobuf::FieldDescriptor;
-using google::protobuf::Message;
-
-/// Elements that `message` has at `field`: of a list, or 1 and 0 for a single field that is set and
-/// not. `field` may hold indexes.
-int Count(const Message& message, std::string_view field) {
-  const Message* level = &message;
-  while (true) {
-    const size_t dot = field.find('.');
-    const std::string_view step = field.substr(0, dot);
-    const size_t bracket = step.find('[');
-    const FieldDescriptor* descriptor = FindField(*level->GetDescriptor(), step.substr(0, bracket));
-    if (descriptor == nullptr) return 0;
-    const google::protobuf::Reflection& reflection = *level->GetReflection();
-    const bool last = dot == std::string_view::npos;
-    const bool is_message = descriptor->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE;
-    if (!last && !is_message) return 0;
-    if (descriptor->is_repeated()) {
-      const int size = reflection.FieldSize(*level, descriptor);
-      int index = 0;  // without an index a list means its first element
-      if (bracket != std::string_view::npos) {
-        const char* const begin = step.data() + bracket + 1;
-        if (std::from_chars(begin, step.data() + step.size(), index).ec != std::errc()) return 0;
-        if (last) return index >= 0 && index < size ? 1 : 0;
-      } else if (last) {
-        return size;
-      }
-      if (index < 0 || index >= size) return 0;
-      level = &reflection.GetRepeatedMessage(*level, descriptor, index);
-    } else {
-      if (!reflection.HasField(*level, descriptor)) return 0;
-      if (last) return 1;
-      level = &reflection.GetMessage(*level, descriptor);
-    }
-    field.remove_prefix(dot + 1);
-  }
-}
-
-/// Clears the field at a path without indexes. False: it is not set, or a part of a list.
-bool Clear(std::string_view path, Message* message) {
-  const auto field = [&](std::string_view name) {
-    return FindField(*message->GetDescriptor(), name);
-  };
-  for (size_t dot = path.find('.'); dot != std::string_view::npos; dot = path.find('.')) {
-    const FieldDescriptor* const group = field(path.substr(0, dot));
-    if (group == nullptr || group->is_repeated() ||
-        group->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) {
-      return false;
-    }
-    message = message->GetReflection()->MutableMessage(message, group);
-    path.remove_prefix(dot + 1);
-  }
-  if (Count(*message, path) == 0) return false;
-  message->GetReflection()->ClearField(message, field(path));
-  return true;
-}
 
 /// Whether the field at `path`, without indexes, goes where `file` takes what its base has.
 bool Removes(const Scenario& file, std::string_view path) {
@@ -95,8 +37,6 @@ std::optional<std::string> ShiftFirstIndex(std::string_view field, int shift) {
 }
 
 }  // namespace
-
-bool HasField(const Message& message, std::string_view field) { return Count(message, field) > 0; }
 
 ScenarioFiles::ScenarioFiles(const fs::path& file, const fs::path& overlay) {
   fs::path next = file;
@@ -142,7 +82,7 @@ Scenario ScenarioFiles::Merged() const {
   for (const File& file : files_) {
     for (int i = 0; i < file.fields.remove_size(); ++i) {
       const std::string& path = file.fields.remove(i);
-      if (path.find('[') == std::string::npos && Clear(path, &merged)) continue;
+      if (ClearField(&merged, path)) continue;
       const std::string field = fmt::format("remove[{}]", i);
       throw ConfigError(fmt::format(
           "{}:{}: {}: {}", file.name, LocateField(file.text, field, file.fields), field,
@@ -174,7 +114,7 @@ FieldPlace ScenarioFiles::Locate(std::string_view field) const {
         place = {file.name, LocateField(file.text, *own, file.fields),
                  *own + std::string(field.substr(path.size()))};
       }
-      before += Count(file.fields, list);
+      before += CountField(file.fields, list);
     }
     if (place.line > 0) return place;
     const size_t dot = path.rfind('.');

@@ -50,8 +50,4 @@ class ScenarioFiles {
   size_t own_ = 0;           // the scenario's
 };
 
-/// True when `message` sets the field with dotted path `field` ("push[0].peak"; a list without
-/// index has elements).
-bool HasField(const google::protobuf::Message& message, std::string_view field);
-
 }  // namespace poise

@@ -298,19 +298,6 @@ void ApplyRealtime(LoadedScenario* loaded) {
   apply("lead", "lead=5");
 }
 
-/// The group of fields at `path`, which holds no index; made where the scenario has none.
-google::protobuf::Message* Group(Scenario* scenario, std::string_view path) {
-  google::protobuf::Message* group = scenario;
-  for (size_t begin = 0; begin <= path.size();) {
-    const size_t end = std::min(path.find('.', begin), path.size());
-    const std::string name(path.substr(begin, end - begin));
-    const auto* const field = FindField(*group->GetDescriptor(), name);
-    group = group->GetReflection()->MutableMessage(group, field);
-    begin = end + 1;
-  }
-  return group;
-}
-
 /// The ends of drives that the scenario uses.
 std::vector<DriveLink> DriveLinksOf(const Scenario& scenario) {
   std::vector<DriveLink> result;
@@ -330,7 +317,7 @@ void ReadDriveProfile(LoadedScenario* loaded) {
   for (const DriveLink& end : DriveLinksOf(*scenario)) {
     if (end.profile.empty()) continue;
     ReadTextProto(Resolve(*loaded, "drives", "drive_profile", scenario->drive_profile()),
-                  Group(scenario, end.profile));
+                  MutableGroup(scenario, end.profile));
     read = true;
   }
   if (!read) {
@@ -368,7 +355,7 @@ void ApplyDrives(const RunChanges& changes, LoadedScenario* loaded) {
       ApplyChange({end.simulated_time + "=true", "--drives"}, loaded);
     }
     if (!end.link.empty() && udp) {
-      Group(scenario, end.link + ".udp");
+      MutableGroup(scenario, end.link + ".udp");
     } else if (!end.link.empty()) {
       const std::string interface = end.drives
                                         ? changes.link.substr(comma + 1)

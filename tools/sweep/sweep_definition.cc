@@ -13,6 +13,7 @@
 #include "components/framework/build_info.h"
 #include "components/framework/configuration/added_fields.h"
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_path.h"
 #include "components/framework/configuration/suggest.h"
 #include "components/framework/modules.h"
 #include "fmt/format.h"

@@ -1,4 +1,4 @@
-// Dotted paths into protobuf messages: LocateField, SetField and ResolvePath.
+// Dotted paths into protobuf messages.
 #include "components/framework/configuration/field_path.h"
 
 #include <google/protobuf/descriptor.h>
@@ -230,6 +230,38 @@ bool SetScalar(Message* message, const FieldDescriptor* field, int index, std::s
   return false;
 }
 
+/// A field and the message that has it, or may have it.
+struct FoundField {
+  const Message* owner = nullptr;
+  const FieldDescriptor* field = nullptr;  ///< nullptr: there is no such field, or no such group
+  int index = -1;                          ///< of a list's element; -1: the whole field
+  bool listed = false;                     ///< it is within a list's element
+};
+
+FoundField Find(const Message& message, std::string_view path) {
+  const auto steps = SplitPath(path);
+  if (!steps.has_value()) return {};
+  FoundField found{&message};
+  for (size_t i = 0; i < steps->size(); ++i) {
+    const Step& step = (*steps)[i];
+    const FieldDescriptor* const field = FindField(*found.owner->GetDescriptor(), step.name);
+    if (field == nullptr || !step.key.empty()) return {};
+    const bool list = field->is_repeated();
+    if (i + 1 == steps->size()) return {found.owner, field, list ? step.index : -1, found.listed};
+    if (field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) return {};
+    const Reflection& reflection = *found.owner->GetReflection();
+    const int index = std::max(step.index, 0);
+    if (list ? index >= reflection.FieldSize(*found.owner, field)
+             : !reflection.HasField(*found.owner, field)) {
+      return {};
+    }
+    found.owner = list ? &reflection.GetRepeatedMessage(*found.owner, field, index)
+                       : &reflection.GetMessage(*found.owner, field);
+    found.listed = found.listed || list;
+  }
+  return {};
+}
+
 /// Text format's errors are of no interest where the text was parsed before.
 class IgnoreErrors final : public google::protobuf::io::ErrorCollector {
  public:
@@ -297,6 +329,48 @@ std::string ResolvePath(const Message& message, std::string_view path) {
     }
   }
   return resolved;
+}
+
+int CountField(const Message& message, std::string_view path) {
+  const auto [owner, field, index, listed] = Find(message, path);
+  if (field == nullptr) return 0;
+  const Reflection& reflection = *owner->GetReflection();
+  if (!field->is_repeated()) return reflection.HasField(*owner, field) ? 1 : 0;
+  const int size = reflection.FieldSize(*owner, field);
+  return index < 0 ? size : index < size ? 1 : 0;
+}
+
+bool HasField(const Message& message, std::string_view path) {
+  return CountField(message, path) > 0;
+}
+
+bool IsTrue(const Message& message, std::string_view path) {
+  const auto [owner, field, index, listed] = Find(message, path);
+  if (field == nullptr || field->is_repeated()) return false;
+  const Reflection& reflection = *owner->GetReflection();
+  if (field->cpp_type() == FieldDescriptor::CPPTYPE_BOOL) return reflection.GetBool(*owner, field);
+  return field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE &&
+         reflection.HasField(*owner, field);
+}
+
+bool ClearField(Message* message, std::string_view path) {
+  const auto [owner, field, index, listed] = Find(*message, path);
+  if (index >= 0 || listed || CountField(*message, path) == 0) return false;
+  // Whoever may change the message may change what it holds.
+  auto* const group = const_cast<Message*>(owner);
+  group->GetReflection()->ClearField(group, field);
+  return true;
+}
+
+Message* MutableGroup(Message* message, std::string_view path) {
+  Message* group = message;
+  for (size_t begin = 0; begin <= path.size();) {
+    const size_t end = std::min(path.find('.', begin), path.size());
+    const auto* const field = FindField(*group->GetDescriptor(), path.substr(begin, end - begin));
+    group = group->GetReflection()->MutableMessage(group, field);
+    begin = end + 1;
+  }
+  return group;
 }
 
 void SetField(Message* message, std::string_view path, std::string_view value) {
