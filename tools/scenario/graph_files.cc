@@ -2,17 +2,12 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <filesystem>
 
-#include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
-#include "tools/scenario/catalog.h"
 
 namespace poise {
 namespace {
-
-namespace fs = std::filesystem;
 
 /// Removes the element of that name from a list and its places. False: there is none.
 template <class List, class Places>
@@ -26,35 +21,15 @@ bool Remove(const std::string& name, List* list, Places* places) {
 
 }  // namespace
 
-GraphFiles::GraphFiles(const std::string& file) {
-  std::string name = file;
-  while (true) {
-    File read{name, ReadFile(name), {}};
-    ParseTextProto(read.text, name, &read.graph);
-    files_.insert(files_.begin(), read);
-    if (!read.graph.has_base()) break;
-    const auto fail = [&](const std::string& problem) { Fail(read, "base", problem); };
-    fs::path base;
-    try {
-      base = FindFile("graphs", read.graph.base(), fs::path(name).parent_path());
-    } catch (const ConfigError& error) {
-      fail(error.what());
-    }
-    const auto same = [&](const File& other) { return fs::equivalent(other.name, base); };
-    if (std::any_of(files_.begin(), files_.end(), same)) fail("the bases form a loop");
-    name = base.string();
-  }
+GraphFiles::GraphFiles(const std::string& file)
+    : files_(ReadWithBases<Graph>(file, "graphs", BaseFiles::kRefused,
+                                  [](const auto&... given) { ParseTextProto(given...); })) {
   Merge();
-}
-
-void GraphFiles::Fail(const File& file, const std::string& field, const std::string& problem) {
-  throw ConfigError(fmt::format("{}:{}: {}: {}", file.name,
-                                LocateField(file.text, field, file.graph), field, problem));
 }
 
 void GraphFiles::Merge() {
   for (size_t f = 0; f < files_.size(); ++f) {
-    const Graph& graph = files_[f].graph;
+    const Graph& graph = files_[f].fields;
     for (int i = 0; i < graph.remove_size(); ++i) {
       const std::string& name = graph.remove(i);
       if (Remove(name, merged_.mutable_component(), &components_) ||
@@ -64,10 +39,10 @@ void GraphFiles::Merge() {
       std::vector<std::string> names;
       for (const ComponentInstance& each : merged_.component()) names.push_back(each.name());
       for (const Channel& each : merged_.channel()) names.push_back(each.name());
-      Fail(files_[f], fmt::format("remove[{}]", i),
-           names.empty() ? "there is no base to remove from; name one with base"
-                         : fmt::format("the base has no component or channel '{}'; {}", name,
-                                       Suggest(name, names)));
+      files_[f].Fail(fmt::format("remove[{}]", i),
+                     names.empty() ? "there is no base to remove from; name one with base"
+                                   : fmt::format("the base has no component or channel '{}'; {}",
+                                                 name, Suggest(name, names)));
     }
     merged_.MergeFrom(graph);
     for (int i = 0; i < graph.channel_size(); ++i) channels_.push_back({f, i});
@@ -90,7 +65,7 @@ std::string GraphFiles::Line(const GraphError::Problem& problem) const {
     field = fmt::format("{}[{}{}", field.substr(0, bracket), places[index].index,
                         field.substr(field.find(']')));
   }
-  const int line = LocateField(place->text, field, Graph());
+  const int line = place->Line(field);
   const std::string where = line > 0 ? fmt::format("{}:{}", place->name, line) : place->name;
   return problem.field.empty() ? fmt::format("{}: {}", where, problem.text)
                                : fmt::format("{}: {}: {}", where, field, problem.text);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "components/framework/graph.h"
+#include "tools/scenario/based_files.h"
 
 namespace poise {
 
@@ -22,20 +23,13 @@ class GraphFiles {
   std::string Line(const GraphError::Problem& problem) const;
 
  private:
-  struct File {
-    std::string name;
-    std::string text;
-    Graph graph;
-  };
+  using File = BasedFile<Graph>;
   /// Where an element of the merged graph stands.
   struct Place {
     size_t file = 0;
     int index = 0;  // in the file's own list
   };
   void Merge();
-  /// Throws ConfigError "file:line: field: problem".
-  [[noreturn]] static void Fail(const File& file, const std::string& field,
-                                const std::string& problem);
 
   std::vector<File> files_;  // the furthest base first
   Graph merged_;

@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <charconv>
 #include <optional>
+#include <utility>
 
-#include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_path.h"
 #include "fmt/format.h"
-#include "tools/scenario/catalog.h"
 #include "tools/scenario/former_fields.h"
 
 namespace poise {
@@ -38,39 +37,12 @@ std::optional<std::string> ShiftFirstIndex(std::string_view field, int shift) {
 
 }  // namespace
 
-ScenarioFiles::ScenarioFiles(const fs::path& file, const fs::path& overlay) {
-  fs::path next = file;
-  while (true) {
-    File read;
-    read.name = next.string();
-    read.text = ReadFile(read.name);
-    ParseScenario(read.text, read.name, &read.fields);
-    const bool has_base = read.fields.has_base();
-    const std::string base = read.fields.base();
-    files_.insert(files_.begin(), std::move(read));
-    if (!has_base) break;
-    const auto fail = [&](const std::string& problem) {
-      throw ConfigError(fmt::format("{}:{}: base: {}", files_.front().name,
-                                    LocateField(files_.front().text, "base", Scenario()), problem));
-    };
-    try {
-      next = FindFile("scenarios", base, next.parent_path(), BaseFiles::kTaken);
-    } catch (const ConfigError& error) {
-      fail(error.what());
-    }
-    std::error_code error;
-    for (const File& earlier : files_) {
-      if (!fs::equivalent(earlier.name, next, error)) continue;
-      fail(fmt::format("{} is based on this file itself; bases may not form a loop", base));
-    }
-  }
-  own_ = files_.size() - 1;
+ScenarioFiles::ScenarioFiles(const fs::path& file, const fs::path& overlay)
+    : files_(ReadWithBases<Scenario>(file, "scenarios", BaseFiles::kTaken, ParseScenario)),
+      own_(files_.size() - 1) {
   if (overlay.empty()) return;
   const Scenario own = Merged();
-  File read;
-  read.name = overlay.string();
-  read.text = ReadFile(read.name);
-  ParseScenario(read.text, read.name, &read.fields);
+  File read = ReadBasedFile<Scenario>(overlay, ParseScenario);
   // A graph or a type of drives of the scenario's own is not to be replaced.
   if (own.graph() != Scenario().graph()) read.fields.clear_graph();
   if (own.has_drive_profile()) read.fields.clear_drive_profile();
@@ -83,13 +55,12 @@ Scenario ScenarioFiles::Merged() const {
     for (int i = 0; i < file.fields.remove_size(); ++i) {
       const std::string& path = file.fields.remove(i);
       if (ClearField(&merged, path)) continue;
-      const std::string field = fmt::format("remove[{}]", i);
-      throw ConfigError(fmt::format(
-          "{}:{}: {}: {}", file.name, LocateField(file.text, field, file.fields), field,
+      file.Fail(
+          fmt::format("remove[{}]", i),
           &file == &files_.front()
               ? "there is no base to remove from; name one with base"
               : fmt::format("the base sets no field '{}'; name a list, a group or a value, whole",
-                            path)));
+                            path));
     }
     merged.MergeFrom(file.fields);
   }
@@ -98,33 +69,42 @@ Scenario ScenarioFiles::Merged() const {
   return merged;
 }
 
-FieldPlace ScenarioFiles::Locate(std::string_view field) const {
+std::pair<const ScenarioFiles::File*, std::string> ScenarioFiles::Find(
+    std::string_view field) const {
   const std::string_view list = field.substr(0, field.find('['));
   for (std::string_view path = field; !path.empty();) {
     const bool indexed = path.size() > list.size();
-    FieldPlace place;
+    const File* found = nullptr;
+    std::string place;
     int before = 0;  // elements of the list in earlier files
     for (const File& file : files_) {
       if (Removes(file.fields, indexed ? list : path)) {
-        place = {};
+        found = nullptr;
         before = 0;
       }
       const auto own = indexed ? ShiftFirstIndex(path, before) : std::string(path);
       if (own && HasField(file.fields, *own)) {
-        place = {file.name, LocateField(file.text, *own, file.fields),
-                 *own + std::string(field.substr(path.size()))};
+        found = &file;
+        place = *own + std::string(field.substr(path.size()));
       }
       before += CountField(file.fields, list);
     }
-    if (place.line > 0) return place;
+    if (found != nullptr) return {found, place};
     const size_t dot = path.rfind('.');
     path = path.substr(0, dot == std::string_view::npos ? 0 : dot);
   }
-  return {file(), 0, std::string(field)};
+  return {nullptr, std::string(field)};
+}
+
+FieldPlace ScenarioFiles::Locate(std::string_view field) const {
+  const auto [found, place] = Find(field);
+  if (found == nullptr) return {file(), 0, place};
+  return {found->name, found->Line(place), place};
 }
 
 fs::path ScenarioFiles::FolderOf(std::string_view field) const {
-  return fs::path(Locate(field).file).parent_path();
+  const File* const found = Find(field).first;
+  return fs::path(found == nullptr ? file() : found->name).parent_path();
 }
 
 }  // namespace poise

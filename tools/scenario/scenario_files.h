@@ -4,8 +4,10 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "tools/scenario/based_files.h"
 #include "tools/scenario/scenario.pb.h"
 
 namespace poise {
@@ -41,11 +43,10 @@ class ScenarioFiles {
   std::filesystem::path FolderOf(std::string_view field) const;
 
  private:
-  struct File {
-    std::string name;
-    std::string text;
-    Scenario fields;  ///< its own alone
-  };
+  using File = BasedFile<Scenario>;
+  /// The file that Locate finds, and the field's path in it; nullptr: there is none.
+  std::pair<const File*, std::string> Find(std::string_view field) const;
+
   std::vector<File> files_;  // the furthest base first, the overlay last
   size_t own_ = 0;           // the scenario's
 };
