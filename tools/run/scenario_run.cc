@@ -78,18 +78,19 @@ void EndRos2(ChildProcess* ros2) {
 }  // namespace
 
 ScenarioRun::ScenarioRun(const std::string& scenario, const RunOptions& options)
+    : ScenarioRun(scenario, SetUpRun(scenario, options.changes), options) {}
+
+ScenarioRun::ScenarioRun(const std::string& scenario, RunSetup setup, const RunOptions& options)
     : scenario_(scenario),
       options_(options),
-      main_(Prepare(scenario, options.changes, options.in_process, true)) {
+      main_(Prepare(std::move(setup), options.in_process, true)) {
   if (options.launch.kills.count > 0) KillSchedule::Check(main_.spec, options.launch.kills);
   if (!main_.loaded.scenario.has_reference()) return;
-  reference_ = Prepare(scenario, ReferenceChanges(main_.loaded, options.changes),
+  reference_ = Prepare(SetUpRun(scenario, ReferenceChanges(main_.loaded, options.changes)),
                        /*in_process=*/true, false);
 }
 
-RunSetup ScenarioRun::Prepare(const std::string& scenario, const RunChanges& changes,
-                              bool in_process, bool warn) const {
-  RunSetup setup = SetUpRun(scenario, changes);
+RunSetup ScenarioRun::Prepare(RunSetup setup, bool in_process, bool warn) const {
   setup.spec.set_recorded(!in_process && options_.launch.log);
   if (!in_process) setup.graph.reset();  // each process makes its own components
   if (warn) {

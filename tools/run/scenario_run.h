@@ -45,6 +45,8 @@ class ScenarioRun {
  public:
   /// Throws ConfigError or RobotError; what is odd about the robot goes to stderr.
   ScenarioRun(const std::string& scenario, const RunOptions& options);
+  /// Of `setup`, which was made with options.changes.
+  ScenarioRun(const std::string& scenario, RunSetup setup, const RunOptions& options);
 
   /// Runs, writes the run's files into a folder (MakeRunDir's rules for `out`) and prints what
   /// happens, the table and the verdict. With `latest`, runs/latest points there before the run
@@ -62,8 +64,7 @@ class ScenarioRun {
   LogSizes log_sizes() const;
 
  private:
-  RunSetup Prepare(const std::string& scenario, const RunChanges& changes, bool in_process,
-                   bool warn) const;
+  RunSetup Prepare(RunSetup setup, bool in_process, bool warn) const;
   /// `dir` has the run's files, and so `info`. Inside this process without a `socket`.
   static RunOutcome RunPart(RunSetup* setup, const run_info_t& info,
                             const std::filesystem::path& dir, const RunSocket* socket, bool quiet,

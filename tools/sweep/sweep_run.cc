@@ -40,6 +40,7 @@ bool NeedsProcesses(const RunSpec& spec, const RunChanges& changes) {
 /// Runs as processes and reads the log; empty where not all ticks until the run's end were done:
 /// `row` says why.
 std::optional<logging::RunRecord> RecordOfProcesses(const std::string& scenario,
+                                                    const RunSetup& setup,
                                                     const RunChanges& changes,
                                                     const std::string& log_dir, SweepRow* row) {
   std::optional<TemporaryDir> temporary;
@@ -49,7 +50,8 @@ std::optional<logging::RunRecord> RecordOfProcesses(const std::string& scenario,
   options.changes = changes;
   options.quiet = true;
   options.force = true;
-  const RunOutcome outcome = ScenarioRun(scenario, options).RunOnly(folder.string());
+  ScenarioRun run(scenario, {setup.loaded, setup.spec, {}, {}}, options);
+  const RunOutcome outcome = run.RunOnly(folder.string());
   if (outcome.interrupted) throw std::runtime_error(outcome.message);
   row->component = outcome.fault.component;
   row->reason = outcome.fault.what;
@@ -157,7 +159,7 @@ SweepRow RunPoint(const std::string& scenario, const RunChanges& changes,
   if (NeedsProcesses(setup->spec, changes)) {
     status->SetWatchedElsewhere();  // by the launcher
     setup->graph.reset();
-    record = RecordOfProcesses(scenario, changes, log_dir, &row);
+    record = RecordOfProcesses(scenario, *setup, changes, log_dir, &row);
     if (!record) return row;
   } else {
     record = Record(&*setup, log_dir, status, &row);
