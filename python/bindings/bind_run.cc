@@ -95,9 +95,7 @@ std::vector<std::string> ElementNamesOf(const RunStore& run, const std::string& 
 }
 
 Scenario ScenarioOf(const RunStore& run) {
-  Scenario scenario;
-  ParseLoggedScenario(run.scenario(), "the run's scenario", &scenario);
-  return scenario;
+  return LoggedScenario(run.scenario(), "the run's scenario");
 }
 
 /// nullopt: the run has no such figure.

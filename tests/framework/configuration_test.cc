@@ -176,9 +176,10 @@ TEST(SetField, AnEmptyTextClearsAListOrAGroup) {
   EXPECT_NE(SetError("phase[0]", "").find("group of fields"), std::string::npos);
 }
 
-TEST(FieldsByPath, AreCountedClearedAndMade) {
+TEST(FieldsByPath, AreCountedToldClearedAndMade) {
   ToyConfig config;
-  ParseTextProto("gains { kp: 3 } phase { kp: 8 } phase { kp: 9 } fail: true", "config", &config);
+  ParseTextProto("gains { kp: 3 } phase { kp: 8 } phase { kp: 9 } fail: true label: 'x'", "config",
+                 &config);
   for (const auto& [path, count] : {std::pair{"gains", 1},
                                     {"gains.kp", 1},
                                     {"gains.kd", 0},
@@ -195,6 +196,13 @@ TEST(FieldsByPath, AreCountedClearedAndMade) {
                                     {"", 0}}) {
     EXPECT_EQ(CountField(config, path), count) << path;
     EXPECT_EQ(HasField(config, path), count > 0) << path;
+  }
+  for (const auto& [path, value] : {std::pair{"phase[1].kp", "9"},
+                                    {"fail", "true"},
+                                    {"label", R"("x")"},
+                                    {"gains", ""},
+                                    {"phase[2].kp", ""}}) {
+    EXPECT_EQ(ValueText(config, path), value) << path;
   }
   for (const char* path : {"fail", "gains"}) EXPECT_TRUE(IsTrue(config, path)) << path;
   for (const char* path : {"gains.kp", "phase", "nothing"})

@@ -60,9 +60,8 @@ void PrintRun(const logging::LogSurvey& survey) {
              static_cast<double>(ticks) * spec.tick_period(), ticks, spec.tick_period(),
              survey.first_tick, spec.num_ticks());
   try {
-    Scenario scenario;
-    ParseLoggedScenario(survey.info.scenario, "RUN_INFO.scenario", &scenario);
-    const std::string changes = FormatChanges(scenario);
+    const std::string changes =
+        FormatChanges(LoggedScenario(survey.info.scenario, "RUN_INFO.scenario"));
     if (!changes.empty()) fmt::print("changed   {}\n", logging::LinesForTerminal(changes));
   } catch (const ConfigError& error) {
     fmt::print("changed   not known: {}\n", ForTerminal(error.what()));

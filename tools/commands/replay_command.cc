@@ -133,8 +133,7 @@ void WriteRun(const ReplayOptions& options, const std::string& log, const fs::pa
   RunSpec run_spec = replay.spec();  // its graph, which tells what the log holds
   *run_spec.mutable_config() = spec.config();
   google::protobuf::TextFormat::PrintToString(run_spec, &info.run_spec);
-  Scenario scenario;
-  ParseLoggedScenario(info.scenario, log + ": RUN_INFO.scenario", &scenario);
+  Scenario scenario = LoggedScenario(info.scenario, log + ": RUN_INFO.scenario");
   for (const std::string& set : options.set) {
     const size_t equals = set.find('=');
     SetField(&scenario, set.substr(0, equals), set.substr(equals + 1));

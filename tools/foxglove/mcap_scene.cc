@@ -77,8 +77,7 @@ class Scene : public logging::McapTopics {
 std::unique_ptr<logging::McapTopics> McapScene(const std::string& log) {
   try {
     logging::RunRecord run = logging::ReadRun(log);
-    Scenario scenario;
-    ParseLoggedScenario(run.info.scenario, log + ": RUN_INFO.scenario", &scenario);
+    Scenario scenario = LoggedScenario(run.info.scenario, log + ": RUN_INFO.scenario");
     return std::make_unique<Scene>(std::move(run), std::move(scenario));
   } catch (const std::runtime_error& error) {
     fmt::print(stderr, "warning: {}; the file has the messages, and no robot to be seen\n",

@@ -50,9 +50,7 @@ logging::RunRecord ReadStart(const LiveRun& live, std::chrono::milliseconds pati
 }
 
 Scenario ReadScenario(const LiveRun& live, const logging::RunRecord& record) {
-  Scenario scenario;
-  ParseLoggedScenario(record.info.scenario, LogOf(live) + ": RUN_INFO.scenario", &scenario);
-  return scenario;
+  return LoggedScenario(record.info.scenario, LogOf(live) + ": RUN_INFO.scenario");
 }
 
 }  // namespace poise

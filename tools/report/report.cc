@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_path.h"
 #include "fmt/format.h"
 #include "logging/metrics/metric_needs.h"
 #include "logging/metrics/metrics.h"
@@ -39,25 +40,6 @@ void Evaluate(const logging::Metric& metric, const logging::RunRecord& run, Chec
   result->passed = result->measured.has_value() &&
                    (!result->at_most || *result->measured <= *result->at_most) &&
                    (!result->at_least || *result->measured >= *result->at_least);
-}
-
-/// A scenario without its assumptions: their values are looked up in it, each as fast as if it were
-/// the only one.
-Scenario WithoutAssumptions(Scenario scenario) {
-  scenario.clear_assumption();
-  return scenario;
-}
-
-/// "0.1" of the scenario's line that sets `field`.
-std::string ValueOf(const Scenario& scenario, const std::string& field) {
-  const std::string text = ScenarioText(scenario);
-  const int line = LocateField(text, field, scenario);
-  if (line == 0) return "";
-  size_t begin = 0;
-  for (int i = 1; i < line; ++i) begin = text.find('\n', begin) + 1;
-  std::string value = text.substr(begin, text.find('\n', begin) - begin);
-  const size_t colon = value.find(": ");
-  return colon == std::string::npos ? "" : value.substr(colon + 2);
 }
 
 /// Lower edge of bin `bin` of health_t::latency_count, us.
@@ -308,9 +290,8 @@ std::string FormatProcesses(const RunOutcome& outcome) {
 std::string FormatAssumptions(const Scenario& scenario) {
   if (scenario.assumption_size() == 0) return "";
   std::string text = "Not given by the paper:\n";
-  const Scenario values = WithoutAssumptions(scenario);
   for (const Assumption& assumption : scenario.assumption()) {
-    const std::string value = ValueOf(values, assumption.field());
+    const std::string value = ValueText(scenario, assumption.field());
     text += ScreenLines(11, "  {:<7}  {}{}{}", assumption.kind(), assumption.field(),
                         value.empty() ? "" : " = " + value,
                         assumption.has_reason() ? ": " + assumption.reason() : "");
@@ -392,10 +373,9 @@ Json RunJson(const Scenario& scenario, const logging::RunRecord& run,
   }
   json["checks"] = ChecksJson(checks);
   json["assumptions"] = Json::array();
-  const Scenario values = WithoutAssumptions(scenario);
   for (const Assumption& assumption : scenario.assumption()) {
     json["assumptions"].push_back({{"field", assumption.field()},
-                                   {"value", ValueOf(values, assumption.field())},
+                                   {"value", ValueText(scenario, assumption.field())},
                                    {"kind", assumption.kind()},
                                    {"reason", assumption.reason()}});
   }

@@ -14,6 +14,7 @@
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "logging/channel_ticks.h"
+#include "tools/run/run_dir.h"
 #include "tools/run/run_registry.h"
 
 namespace poise {
@@ -44,7 +45,7 @@ fs::path FindRunDir(const std::string& run, std::string_view log_command,
 }
 
 RunSpec ReadLiveSpec(const fs::path& dir, std::string_view log_command) {
-  const fs::path file = dir / "run_spec.pbtxt";
+  const fs::path file = dir / kSpecFile;
   // A run that is just starting has not written its files yet, or not whole.
   const auto deadline = std::chrono::steady_clock::now() + kConnectPatience;
   while (RunInProgress(dir)) {
@@ -92,7 +93,7 @@ LiveRun::LiveRun(const std::string& run, std::string_view log_command, std::stri
       throw ConfigError(
           fmt::format("{}: channel {} has no known type '{}' with its counts; is the run of "
                       "another version of Poise?{}",
-                      (dir_ / "run_spec.pbtxt").string(), channel.name(), channel.type(),
+                      (dir_ / kSpecFile).string(), channel.name(), channel.type(),
                       type == nullptr ? " " + ModulesSearched() : ""));
     }
     lanes_.emplace(channel.name(),

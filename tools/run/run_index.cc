@@ -24,10 +24,10 @@ namespace fs = std::filesystem;
 
 std::vector<std::string> FlagsOf(const RunSpec& spec, const fs::path& dir) {
   static const std::set<std::string> kOfOneField = {"--robot", "--world", "--duration", "--seed"};
-  const std::string file = (dir / "scenario.pbtxt").string();
+  const std::string file = (dir / kScenarioFile).string();
   Scenario scenario;
   try {
-    ParseLoggedScenario(ReadFile(file), file, &scenario);
+    scenario = LoggedScenario(ReadFile(file), file);
   } catch (const ConfigError&) {  // another version's: the run is listed all the same
   }
   const Applied& applied = scenario.applied();
@@ -73,7 +73,7 @@ PastRun RunOf(const fs::path& dir) {
   }
   run.started_at = cell.started_at;
   // Its start is all that is told of a run without a summary.
-  if (run.started_at.empty() && stat((dir / "run_spec.pbtxt").c_str(), &status) == 0) {
+  if (run.started_at.empty() && stat((dir / kSpecFile).c_str(), &status) == 0) {
     run.started_at = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(status.st_mtim.tv_sec));
   }
   return run;
@@ -88,7 +88,7 @@ std::vector<PastRun> PastRuns() {
   // It follows no link: runs/latest is not another run.
   for (fs::recursive_directory_iterator at(RunsDir(), options, error), end; at != end;
        at.increment(error)) {
-    if (!fs::is_regular_file(at->path() / "run_spec.pbtxt", error) || at->is_symlink(error)) {
+    if (!fs::is_regular_file(at->path() / kSpecFile, error) || at->is_symlink(error)) {
       continue;
     }
     at.disable_recursion_pending();  // a reference is part of its run

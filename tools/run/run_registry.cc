@@ -239,7 +239,7 @@ fs::path LatestEndedRun() {
   double least = 0;
   std::error_code error;
   const auto take = [&](const fs::path& dir, double age) {
-    if (!fs::is_regular_file(dir / "run_spec.pbtxt", error)) return;
+    if (!fs::is_regular_file(dir / kSpecFile, error)) return;
     if (!newest.empty() && age >= least) return;
     newest = dir;
     least = age;

@@ -332,8 +332,7 @@ ReportedRun ReadReportedRun(const std::string& run, StageLine* line) {
                     "scenario's text there",
                     result.log));
   }
-  ParseLoggedScenario(result.record.info.scenario, result.log + ": RUN_INFO.scenario",
-                      &result.scenario);
+  result.scenario = LoggedScenario(result.record.info.scenario, result.log + ": RUN_INFO.scenario");
   line->Begin("figures of the table");
   PrepareRecord(result.log, result.scenario, &result.record);
   if (result.scenario.has_reference() && result.record.reference == nullptr) {

@@ -77,8 +77,10 @@ void ParseScenario(std::string_view text, std::string_view source, Scenario* sce
   Parse(text, source, scenario, nullptr);
 }
 
-void ParseLoggedScenario(std::string_view text, std::string_view source, Scenario* scenario) {
-  Parse(text, source, scenario, IsGone);
+Scenario LoggedScenario(std::string_view text, std::string_view source) {
+  Scenario scenario;
+  Parse(text, source, &scenario, IsGone);
+  return scenario;
 }
 
 }  // namespace poise

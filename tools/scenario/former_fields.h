@@ -14,7 +14,8 @@ std::string FormerField(std::string_view path);
 
 /// ParseTextProto of a scenario: its error says what to do about a former name.
 void ParseScenario(std::string_view text, std::string_view source, Scenario* scenario);
-/// Parses the scenario of a run that has been, and passes over fields that went with what they set.
-void ParseLoggedScenario(std::string_view text, std::string_view source, Scenario* scenario);
+/// The scenario of a run that has been, parsed from `text`: fields that went with what they set are
+/// passed over. Throws as ParseScenario does.
+Scenario LoggedScenario(std::string_view text, std::string_view source);
 
 }  // namespace poise

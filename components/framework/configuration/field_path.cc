@@ -344,6 +344,16 @@ bool HasField(const Message& message, std::string_view path) {
   return CountField(message, path) > 0;
 }
 
+std::string ValueText(const Message& message, std::string_view path) {
+  const auto [owner, field, index, listed] = Find(message, path);
+  std::string text;
+  if (!HasField(message, path) || field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE)
+    return text;
+  google::protobuf::TextFormat::PrintFieldValueToString(
+      *owner, field, field->is_repeated() ? std::max(index, 0) : -1, &text);
+  return text;
+}
+
 bool IsTrue(const Message& message, std::string_view path) {
   const auto [owner, field, index, listed] = Find(message, path);
   if (field == nullptr || field->is_repeated()) return false;

@@ -24,6 +24,10 @@ int CountField(const google::protobuf::Message& message, std::string_view path);
 /// True when `message` sets the field at `path`; a list without an index has elements.
 bool HasField(const google::protobuf::Message& message, std::string_view path);
 
+/// Text of the value at `path` as a file has it, "0.1"; of a list, its first. Empty: it is not set,
+/// or a group.
+std::string ValueText(const google::protobuf::Message& message, std::string_view path);
+
 /// Whether a setting is true, or a group is set. A group that is not set has no settings, whatever
 /// their defaults are.
 bool IsTrue(const google::protobuf::Message& message, std::string_view path);

@@ -133,9 +133,8 @@ TEST_F(BadInputTest, AFormerNameIsAnsweredWithTheNewOne) {
                 {"assumption[0].field", "write sim.push"});
   file = Changed("state_estimator {", "state_estimator { method: INVARIANT_EKF ");
   ExpectRefused({"run", file}, {Line(), "method", "leave it out"});
-  Scenario logged;  // of a run that has been such a field is passed over
-  ParseLoggedScenario(ReadFile(file), file, &logged);
-  EXPECT_TRUE(logged.has_sim());
+  // Of a run that has been, such a field is passed over.
+  EXPECT_TRUE(LoggedScenario(ReadFile(file), file).has_sim());
   ExpectRefused({"run", StandScenario(), "--set", "state_estimator.method=INVARIANT_EKF"},
                 {"--set state_estimator.method", "leave it out"});
   file = Changed("metric: \"violated_ticks\"", "metric: \"invariant_ekf_tilt_max\"");
