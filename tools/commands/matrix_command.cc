@@ -70,7 +70,7 @@ Job MakeJob(const std::string& scenario, const std::string& unique_name, const s
   job.cell.paper_section = loaded.scenario.paper_section();
   job.cell.variant = variant;
   job.cell.ablation = ablation.name;
-  const bool own_checks = !loaded.variant || loaded.variant->check_size() > 0;
+  const bool own_checks = loaded.variant() == nullptr || loaded.variant()->check_size() > 0;
   job.cell.must_pass = own_checks && ablation.flags().empty();
   job.arguments = {"run", scenario, "--inline", "--quiet"};
   if (!variant.empty()) job.arguments.insert(job.arguments.end(), {"--variant", variant});

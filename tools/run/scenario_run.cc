@@ -121,20 +121,18 @@ RunOutcome ScenarioRun::RunPart(RunSetup* setup, const run_info_t& info, const f
 void ScenarioRun::PrintHeading() const {
   const Scenario& scenario = main_.loaded.scenario;
   const RunSpec& spec = main_.spec;
-  const bool varied = main_.loaded.variant.has_value();
-  const std::string variant =
-      varied ? fmt::format(", variant {}", main_.loaded.variant->name()) : "";
+  const Variant* const chosen = main_.loaded.variant();
+  const std::string variant = chosen != nullptr ? fmt::format(", variant {}", chosen->name()) : "";
   const std::string paper =
       scenario.has_paper_section()
           ? fmt::format(" ({}the paper's {})", ChangedByHand(scenario) ? "changed from " : "",
                         scenario.paper_section())
           : "";
-  std::string text =
-      fmt::format("{}{}{}: {}\n", Toned(spec.scenario(), Tone::kStrong), variant, paper,
-                  varied && main_.loaded.variant->has_description()
-                      ? fmt::format("{} (a variant of: {})", main_.loaded.variant->description(),
-                                    scenario.description())
-                      : scenario.description());
+  std::string text = fmt::format(
+      "{}{}{}: {}\n", Toned(spec.scenario(), Tone::kStrong), variant, paper,
+      chosen != nullptr && chosen->has_description()
+          ? fmt::format("{} (a variant of: {})", chosen->description(), scenario.description())
+          : scenario.description());
   text += FormatChanges(scenario);
   if (reference_) {
     text += fmt::format("compared with variant {}, which runs first, in one process\n",

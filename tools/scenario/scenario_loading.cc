@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <initializer_list>
 
 #include "components/framework/configuration/added_fields.h"
 #include "components/framework/configuration/configuration.h"
@@ -78,16 +79,20 @@ std::string NoVariant(const std::string& name, const std::vector<std::string>& n
                        : fmt::format("no variant named '{}'; {}", name, Suggest(name, names));
 }
 
+/// Whether `field` was changed, by one of `flags` where any is given.
+bool IsChanged(const LoadedScenario& loaded, std::string_view field,
+               std::initializer_list<std::string_view> flags = {}) {
+  return std::ranges::any_of(loaded.changes, [&](const FieldChange& change) {
+    return (flags.size() == 0 || std::ranges::find(flags, change.by) != flags.end()) &&
+           PathOf(loaded, change) == field;
+  });
+}
+
 /// at_most is below at_least: says so at the one that was changed, and what to do with the other.
 [[noreturn]] void FailLimits(const LoadedScenario& loaded, int index) {
   const Check& check = loaded.scenario.check(index);
   const std::string path = fmt::format("check[{}]", index);
-  const auto changed = [&](const char* field) {
-    return std::any_of(
-        loaded.changes.begin(), loaded.changes.end(),
-        [&](const FieldChange& change) { return PathOf(loaded, change) == path + "." + field; });
-  };
-  const bool least = changed("at_least") && !changed("at_most");
+  const bool least = IsChanged(loaded, path + ".at_least") && !IsChanged(loaded, path + ".at_most");
   const char* const other = least ? "at_most" : "at_least";
   FailField(loaded, fmt::format("{}.{}", path, least ? "at_least" : "at_most"),
             fmt::format("is {}, {} the check's {}, {}; change that too, or leave it out with --set "
@@ -112,12 +117,7 @@ void CheckScenario(const LoadedScenario& loaded) {
     fail(error.field(), error.problem());
   }
   if (!(s.check_from() < s.duration())) {
-    const auto changed = [&](const char* field) {
-      return std::any_of(
-          loaded.changes.begin(), loaded.changes.end(),
-          [&](const FieldChange& change) { return PathOf(loaded, change) == field; });
-    };
-    if (changed("duration") && !changed("check_from")) {
+    if (IsChanged(loaded, "duration") && !IsChanged(loaded, "check_from")) {
       fail("duration", fmt::format("is {} s; must be more than check_from, {} s, from which on the "
                                    "scenario is checked",
                                    s.duration(), s.check_from()));
@@ -150,7 +150,12 @@ void CheckScenario(const LoadedScenario& loaded) {
 }
 
 bool HasOwnChecks(const LoadedScenario& loaded) {
-  return loaded.variant && loaded.variant->check_size() > 0;
+  return loaded.variant() != nullptr && loaded.variant()->check_size() > 0;
+}
+
+/// Whether the chosen variant has asked for the change.
+bool IsOfVariant(const LoadedScenario& loaded, const FieldChange& change) {
+  return loaded.variant() != nullptr && change.by == VariantLabel(*loaded.variant());
 }
 
 /// The line of an error in `field`, to which `change` gave its value.
@@ -164,11 +169,11 @@ std::string Describe(const LoadedScenario& loaded, const FieldChange& change,
     return fmt::format("{} {}: {}", change.by,
                        inside ? WrittenPath(change) + rest : std::string(field), problem);
   }
-  if (!loaded.variant || change.by != VariantLabel(*loaded.variant)) {
+  if (!IsOfVariant(loaded, change)) {
     return fmt::format("{}: {}: {}", change.by, field, problem);
   }
-  int i = loaded.variant->set_size() - 1;
-  while (i > 0 && loaded.variant->set(i) != change.set) --i;
+  int i = loaded.variant()->set_size() - 1;
+  while (i > 0 && loaded.variant()->set(i) != change.set) --i;
   const FieldPlace place =
       loaded.files.Locate(fmt::format("variant[{}].set[{}]", loaded.variant_index, i));
   return fmt::format("{}:{}: {}: {}: {}", place.file, place.line, place.field, field, problem);
@@ -265,8 +270,7 @@ void ApplyVariant(const std::string& name, LoadedScenario* loaded) {
         fmt::format("--variant {}: {}: {}", name, loaded->files.file(), NoVariant(name, names)));
   }
   loaded->variant_index = static_cast<int>(found - names.begin());
-  loaded->variant = loaded->scenario.variant(loaded->variant_index);
-  const Variant& variant = *loaded->variant;
+  const Variant variant = *loaded->variant();
   for (const std::string& set : variant.set()) ApplyChange({set, VariantLabel(variant)}, loaded);
   if (variant.check_size() > 0) *loaded->scenario.mutable_check() = variant.check();
 }
@@ -275,11 +279,7 @@ void ApplyVariant(const std::string& name, LoadedScenario* loaded) {
 /// where --set does, then in deploy/`kind`.
 std::string Resolve(const LoadedScenario& loaded, const std::string& kind, const std::string& field,
                     const std::string& name) {
-  const bool set =
-      std::any_of(loaded.changes.begin(), loaded.changes.end(), [&](const FieldChange& change) {
-        return (change.by == kSetFlag || change.by == kRobotFlag) &&
-               PathOf(loaded, change) == field;
-      });
+  const bool set = IsChanged(loaded, field, {kSetFlag, kRobotFlag});
   try {
     return FindFile(kind, name, set ? fs::current_path() : loaded.files.FolderOf(field)).string();
   } catch (const ConfigError& error) {
@@ -392,7 +392,7 @@ std::string SetsBeside(const LoadedScenario& loaded, std::string_view parent) {
   std::string sets;
   for (const FieldChange& change : loaded.changes) {
     const std::string path = PathOf(loaded, change);
-    if (change.by != VariantLabel(*loaded.variant)) continue;
+    if (!IsOfVariant(loaded, change)) continue;
     if (std::string_view(path).substr(0, path.rfind('.')) != parent) continue;
     sets += (sets.empty() ? "" : ", ") + change.set;
   }
@@ -419,7 +419,7 @@ void FailField(const LoadedScenario& loaded, std::string_view field, std::string
   // A variant may contradict what its scenario's file says beside what it sets.
   const auto parent = [](std::string_view path) { return path.substr(0, path.rfind('.')); };
   for (const FieldChange& change : loaded.changes) {
-    if (!loaded.variant || change.by != VariantLabel(*loaded.variant)) continue;
+    if (!IsOfVariant(loaded, change)) continue;
     if (parent(PathOf(loaded, change)) != parent(field) || place.line == 0) continue;
     throw ConfigError(fmt::format("{}:{}: {}: {}; {} sets {}", place.file, place.line, place.field,
                                   problem, change.by, SetsBeside(loaded, parent(field))));

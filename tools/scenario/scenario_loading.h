@@ -51,10 +51,14 @@ struct LoadedScenario {
   /// Merged, with the changes. `reference` is empty when none is to be run.
   Scenario scenario;
   std::vector<FieldChange> changes;  ///< in order
-  std::optional<Variant> variant;    ///< the one that was chosen, as the file has it
-  int variant_index = -1;            ///< its place in the file's list
+  int variant_index = -1;            ///< of the variant that was chosen; -1: none
   std::string graph_file;
   std::string robot_file;
+
+  /// The variant that was chosen, which no change can change; nullptr: none.
+  const Variant* variant() const {
+    return variant_index < 0 ? nullptr : &scenario.variant(variant_index);
+  }
 };
 
 /// Reads and checks the scenario itself: bases, variants' names, duration, rate, metrics and limits
