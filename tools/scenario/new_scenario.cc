@@ -1,12 +1,11 @@
 #include "tools/scenario/new_scenario.h"
 
-#include <google/protobuf/text_format.h>
-
 #include <regex>
 #include <sstream>
 #include <vector>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_path.h"
 #include "fmt/format.h"
 #include "tools/scenario/catalog.h"
 #include "tools/scenario/former_fields.h"
@@ -22,12 +21,7 @@ constexpr char kTemplate[] = "template";
 std::string Quoted(const std::string& text) {
   Scenario scenario;
   scenario.set_name(text);
-  std::string line;
-  google::protobuf::TextFormat::Printer printer;
-  printer.SetSingleLineMode(true);
-  printer.PrintToString(scenario, &line);
-  line = line.substr(line.find('"'));
-  return line.substr(0, line.rfind('"') + 1);
+  return ValueText(scenario, "name");
 }
 
 /// The lines of a file in which single fields of the whole scenario are written anew.

@@ -1,6 +1,5 @@
 #include "tools/sweep/sweep_definition.h"
 
-#include <google/protobuf/text_format.h>
 #include <link.h>
 
 #include <algorithm>
@@ -343,14 +342,8 @@ SweepDefinition::SweepDefinition(const SweepArguments& arguments, bool limit)
 
   Sweep definition = sweep;
   definition.clear_scenario();  // its text stands below
-  std::string all;
-  google::protobuf::TextFormat::PrintToString(definition, &all);
   base.clear_applied();
-  all += ScenarioText(base);
-  google::protobuf::TextFormat::Printer printer;
-  std::string graph;
-  printer.PrintToString(spec.graph(), &graph);
-  all += graph;
+  std::string all = TextOf(definition) + ScenarioText(base) + TextOf(spec.graph());
   for (const Resource& resource : spec.resource()) all += resource.text();
   digest_ = Digest(all + PoiseVersion());
 }

@@ -233,33 +233,29 @@ bool SetScalar(Message* message, const FieldDescriptor* field, int index, std::s
 /// A field and the message that has it, or may have it.
 struct FoundField {
   const Message* owner = nullptr;
-  const FieldDescriptor* field = nullptr;  ///< nullptr: there is no such field, or no such group
+  const FieldDescriptor* field = nullptr;  ///< nullptr: there is no such field or element
   int index = -1;                          ///< of a list's element; -1: the whole field
-  bool listed = false;                     ///< it is within a list's element
+  bool plain = true;  ///< every group on the way is set, and none is a list's element
 };
 
 FoundField Find(const Message& message, std::string_view path) {
-  const auto steps = SplitPath(path);
-  if (!steps.has_value()) return {};
   FoundField found{&message};
-  for (size_t i = 0; i < steps->size(); ++i) {
-    const Step& step = (*steps)[i];
-    const FieldDescriptor* const field = FindField(*found.owner->GetDescriptor(), step.name);
-    if (field == nullptr || !step.key.empty()) return {};
-    const bool list = field->is_repeated();
-    if (i + 1 == steps->size()) return {found.owner, field, list ? step.index : -1, found.listed};
-    if (field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) return {};
-    const Reflection& reflection = *found.owner->GetReflection();
-    const int index = std::max(step.index, 0);
-    if (list ? index >= reflection.FieldSize(*found.owner, field)
-             : !reflection.HasField(*found.owner, field)) {
-      return {};
+  for (const Step& step : SplitPath(path).value_or(std::vector<Step>())) {
+    if (found.field != nullptr) {  // the group that the step is in
+      if (found.field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) return {};
+      const Reflection& reflection = *found.owner->GetReflection();
+      const bool list = found.field->is_repeated();
+      const int index = std::max(found.index, 0);
+      if (list && index >= reflection.FieldSize(*found.owner, found.field)) return {};
+      found.plain = found.plain && !list && reflection.HasField(*found.owner, found.field);
+      found.owner = list ? &reflection.GetRepeatedMessage(*found.owner, found.field, index)
+                         : &reflection.GetMessage(*found.owner, found.field);
     }
-    found.owner = list ? &reflection.GetRepeatedMessage(*found.owner, field, index)
-                       : &reflection.GetMessage(*found.owner, field);
-    found.listed = found.listed || list;
+    found.field = FindField(*found.owner->GetDescriptor(), step.name);
+    if (found.field == nullptr || !step.key.empty()) return {};
+    found.index = found.field->is_repeated() ? step.index : -1;
   }
-  return {};
+  return found;
 }
 
 /// Text format's errors are of no interest where the text was parsed before.
@@ -306,33 +302,21 @@ int LocateField(std::string_view text, std::string_view field, const Message& pr
 std::string ResolvePath(const Message& message, std::string_view path) {
   const auto steps = SplitPath(path);
   if (!steps.has_value()) return std::string(path);
-  const Message* level = &message;
   std::string resolved;
   for (const Step& step : *steps) {
-    if (!resolved.empty()) resolved += '.';
-    resolved += step.name;
-    const FieldDescriptor* field =
-        level == nullptr ? nullptr : FindField(*level->GetDescriptor(), step.name);
+    resolved += (resolved.empty() ? "" : ".") + step.name;
     int index = step.index;
-    if (!step.key.empty() && field != nullptr && field->is_repeated()) {
-      index = FindElement(*level, *field, step.key, path);
+    const FoundField list = step.key.empty() ? FoundField() : Find(message, resolved);
+    if (list.field != nullptr && list.field->is_repeated()) {
+      index = FindElement(*list.owner, *list.field, step.key, path);
     }
     if (index >= 0) resolved += fmt::format("[{}]", index);
-    const bool group = field != nullptr && field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE;
-    if (!group) {
-      level = nullptr;
-    } else if (!field->is_repeated()) {
-      level = &level->GetReflection()->GetMessage(*level, field);
-    } else {
-      const bool there = index >= 0 && index < level->GetReflection()->FieldSize(*level, field);
-      level = there ? &level->GetReflection()->GetRepeatedMessage(*level, field, index) : nullptr;
-    }
   }
   return resolved;
 }
 
 int CountField(const Message& message, std::string_view path) {
-  const auto [owner, field, index, listed] = Find(message, path);
+  const auto [owner, field, index, plain] = Find(message, path);
   if (field == nullptr) return 0;
   const Reflection& reflection = *owner->GetReflection();
   if (!field->is_repeated()) return reflection.HasField(*owner, field) ? 1 : 0;
@@ -345,7 +329,7 @@ bool HasField(const Message& message, std::string_view path) {
 }
 
 std::string ValueText(const Message& message, std::string_view path) {
-  const auto [owner, field, index, listed] = Find(message, path);
+  const auto [owner, field, index, plain] = Find(message, path);
   std::string text;
   if (!HasField(message, path) || field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE)
     return text;
@@ -355,8 +339,8 @@ std::string ValueText(const Message& message, std::string_view path) {
 }
 
 bool IsTrue(const Message& message, std::string_view path) {
-  const auto [owner, field, index, listed] = Find(message, path);
-  if (field == nullptr || field->is_repeated()) return false;
+  const auto [owner, field, index, plain] = Find(message, path);
+  if (field == nullptr || field->is_repeated() || !plain) return false;
   const Reflection& reflection = *owner->GetReflection();
   if (field->cpp_type() == FieldDescriptor::CPPTYPE_BOOL) return reflection.GetBool(*owner, field);
   return field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE &&
@@ -364,8 +348,8 @@ bool IsTrue(const Message& message, std::string_view path) {
 }
 
 bool ClearField(Message* message, std::string_view path) {
-  const auto [owner, field, index, listed] = Find(*message, path);
-  if (index >= 0 || listed || CountField(*message, path) == 0) return false;
+  const auto [owner, field, index, plain] = Find(*message, path);
+  if (index >= 0 || !plain || CountField(*message, path) == 0) return false;
   // Whoever may change the message may change what it holds.
   auto* const group = const_cast<Message*>(owner);
   group->GetReflection()->ClearField(group, field);
