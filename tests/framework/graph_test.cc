@@ -350,7 +350,7 @@ class DeclaredPortsTest : public GraphTest {
   std::vector<PortType> Right() {
     std::vector<PortType> ports;
     const BoundGraph bound(ToyRun(graph_, 10), registry_);
-    const Wiring& wiring = const_cast<BoundGraph&>(bound).component(1).wiring;
+    const Wiring& wiring = bound.component(1).wiring;
     for (const InputPort* input : wiring.inputs()) {
       ports.push_back({input->name(), input->type_name(), true, input->kind()});
     }

@@ -28,23 +28,17 @@ struct BasedFile {
   }
 };
 
-/// `parse`: ParseTextProto or ParseScenario.
-template <class Message, class Parse>
-BasedFile<Message> ReadBasedFile(const std::filesystem::path& file, Parse parse) {
-  BasedFile<Message> read{file.string(), ReadFile(file.string()), {}};
-  parse(read.text, read.name, &read.fields);
-  return read;
-}
-
 /// Reads `file`, its base (FindFile), and so on: the furthest base comes first. Throws ConfigError
-/// "file:line: base: problem": no such file, bases that form a loop; and `parse`'s.
+/// "file:line: base: problem": no such file, bases that form a loop; and those of `parse`, which is
+/// ParseTextProto or ParseScenario.
 template <class Message, class Parse>
 std::vector<BasedFile<Message>> ReadWithBases(std::filesystem::path file, const std::string& kind,
                                               BaseFiles bases, Parse parse) {
   std::vector<BasedFile<Message>> files;
   while (true) {
-    files.insert(files.begin(), ReadBasedFile<Message>(file, parse));
-    const BasedFile<Message>& last = files.front();
+    BasedFile<Message>& last =
+        *files.insert(files.begin(), {file.string(), ReadFile(file.string()), {}});
+    parse(last.text, last.name, &last.fields);
     if (!last.fields.has_base()) return files;
     const std::string& base = last.fields.base();
     try {

@@ -42,7 +42,7 @@ ScenarioFiles::ScenarioFiles(const fs::path& file, const fs::path& overlay)
       own_(files_.size() - 1) {
   if (overlay.empty()) return;
   const Scenario own = Merged();
-  File read = ReadBasedFile<Scenario>(overlay, ParseScenario);
+  File read = ReadWithBases<Scenario>(overlay, "drives", BaseFiles::kRefused, ParseScenario).back();
   // A graph or a type of drives of the scenario's own is not to be replaced.
   if (own.graph() != Scenario().graph()) read.fields.clear_graph();
   if (own.has_drive_profile()) read.fields.clear_drive_profile();
