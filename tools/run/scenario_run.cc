@@ -238,7 +238,7 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   if (StopSignal() == 0) {
     std::optional<ChildProcess> ros2;
     if (options_.ros2) ros2.emplace("ros2", Ros2Command(result.dir), result.dir / kRos2Log);
-    info.started_at = logging::TimeNow();  // which the reference has taken some of
+    info.started_at = logging::TimeNow();  // the reference has run meanwhile
     summary.outcome = options_.interactive
                           ? options_.interactive(main_.spec, scenario, info, result.dir / "run.lcm")
                           : RunPart(&main_, info, result.dir, source ? &source->socket() : nullptr,

@@ -45,7 +45,7 @@ class ScenarioRun {
  public:
   /// Throws ConfigError or RobotError; what is odd about the robot goes to stderr.
   ScenarioRun(const std::string& scenario, const RunOptions& options);
-  /// Of `setup`, which was made with options.changes.
+  /// Takes `setup`, which was made with options.changes.
   ScenarioRun(const std::string& scenario, RunSetup setup, const RunOptions& options);
 
   /// Runs, writes the run's files into a folder (MakeRunDir's rules for `out`) and prints what

@@ -38,7 +38,7 @@ struct RunSetup {
   LoadedScenario loaded;
   RunSpec spec;
   std::optional<BoundGraph> graph;    ///< its components, for who runs them inside this process
-  std::vector<std::string> warnings;  ///< of WarningsOf
+  std::vector<std::string> warnings;  ///< those of WarningsOf
 };
 
 /// The whole way. Throws as LoadScenario, MakeRunSpec and ConfigureRun do.

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <initializer_list>
+#include <set>
 
 #include "components/framework/configuration/added_fields.h"
 #include "components/framework/configuration/configuration.h"
@@ -229,13 +230,13 @@ void CheckReference(const LoadedScenario& loaded) {
 /// Checks the variants' names, and that of the reference.
 void CheckVariants(const LoadedScenario& loaded) {
   const std::vector<std::string> names = VariantNames(loaded.scenario);
+  std::set<std::string> taken;
   for (size_t i = 0; i < names.size(); ++i) {
     const auto fail = [&](const std::string& problem) {
       FailField(loaded, fmt::format("variant[{}].name", i), problem);
     };
     if (const std::string problem = NameProblem(names[i]); !problem.empty()) fail(problem);
-    if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(i), names[i]) !=
-        names.begin() + static_cast<std::ptrdiff_t>(i)) {
+    if (!taken.insert(names[i]).second) {
       fail(fmt::format("there are two variants named '{}'", names[i]));
     }
   }
@@ -340,14 +341,13 @@ void ApplyDrives(const RunChanges& changes, LoadedScenario* loaded) {
                     changes.link));
   }
   const std::vector<DriveLink> ends = DriveLinksOf(*scenario);
-  if (!changes.link.empty() && std::none_of(ends.begin(), ends.end(), [](const DriveLink& end) {
-        return !end.link.empty();
-      })) {
+  const auto any_has = [&](std::string DriveLink::*field) {
+    return std::ranges::any_of(ends, [&](const DriveLink& end) { return !(end.*field).empty(); });
+  };
+  if (!changes.link.empty() && !any_has(&DriveLink::link)) {
     throw ConfigError("--link: these drives have no frames; their network interface is a setting");
   }
-  if (!changes.capture.empty() && std::none_of(ends.begin(), ends.end(), [](const DriveLink& end) {
-        return !end.capture.empty();
-      })) {
+  if (!changes.capture.empty() && !any_has(&DriveLink::capture)) {
     throw ConfigError("--capture: these drives have no frames");
   }
   for (const DriveLink& end : ends) {

@@ -51,7 +51,7 @@ struct LoadedScenario {
   /// Merged, with the changes. `reference` is empty when none is to be run.
   Scenario scenario;
   std::vector<FieldChange> changes;  ///< in order
-  int variant_index = -1;            ///< of the variant that was chosen; -1: none
+  int variant_index = -1;            ///< place of the chosen variant in the list; -1: none
   std::string graph_file;
   std::string robot_file;
 

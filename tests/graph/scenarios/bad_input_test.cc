@@ -133,7 +133,7 @@ TEST_F(BadInputTest, AFormerNameIsAnsweredWithTheNewOne) {
                 {"assumption[0].field", "write sim.push"});
   file = Changed("state_estimator {", "state_estimator { method: INVARIANT_EKF ");
   ExpectRefused({"run", file}, {Line(), "method", "leave it out"});
-  // Of a run that has been, such a field is passed over.
+  // The scenario of a run that has been may have it: it is passed over.
   EXPECT_TRUE(LoggedScenario(ReadFile(file), file).has_sim());
   ExpectRefused({"run", StandScenario(), "--set", "state_estimator.method=INVARIANT_EKF"},
                 {"--set state_estimator.method", "leave it out"});
