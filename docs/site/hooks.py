@@ -59,7 +59,7 @@ def on_post_build(config):
     with open(f"{site}/search/search_index.json", encoding="utf-8") as file:
         index = json.load(file)
     for entry in index["docs"]:
-        if re.match("docs/lab/2|CHANGELOG|reference/", entry["location"]):
+        if re.match("docs/lab/.+/2|CHANGELOG|reference/", entry["location"]):
             entry["boost"] = 0.2  # what explains comes before what was once, and before the longest lists
     [worker] = glob.glob(f"{site}/assets/javascripts/workers/search.*.js")
     with open(worker, encoding="utf-8") as file:

@@ -2,11 +2,14 @@
 """Says which figures of docs/results/ are older than the code that they speak of, and reads the pages for deploy/results.
 
 A paragraph below each table names the commit that was measured and the folders that the figures depend on:
-"Measured: COMMIT, DATE, SEED, MACHINE, of `FOLDER/`, `FOLDER/`: COMMAND". They are older where git knows a later commit
-that changed more than comments there; of a range of commits the first counts. Without the repository's history nothing is said.
+"Measured: COMMIT, DATE, SEED, MACHINE, of `FOLDER/`, `FOLDER/`: COMMAND". They are older where git knows later commits
+that changed more than comments there; of a range of commits the first counts. How often the bits of the recorded runs
+have changed since tells what such changes may be worth. A table that ends with "Compared by the tests." is not older,
+since a test makes it anew. Without the repository's history nothing is said.
 Usage: docs/site/older.py [PAGE...]
 """
 
+import functools
 import glob
 import os
 import re
@@ -17,24 +20,59 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 MEASURED = re.compile(r"^Measured: (\w{7})(?: to \w{7})?, (?:.+\n)*?.*?\bof\s+((?:`[\w/]+/`,?\s*)+):(.*(?:\n.+)*)", re.M)
 CELL = re.compile(r"(?<!\\)\|")  # what parts the cells of a table's line
 PROGRAM = re.compile(r"(?:[A-Z_]+=\S+ )*(?:poise|perf|git|node \S+|deploy/\S+|(?:build|tests)/\w+/\S+(?<!\.cc))(?: |$)")
+COMPARED = "Compared by the tests."
+BITS = "deploy/bits/*.bytes"  # a file for each recorded run
 CODE = r"^[[:space:]]*[^/#[:space:]]"  # a line that is more than a comment
 
 
-def later(commit, folders, root=ROOT):
-    """The last commit after `commit` that changed more than comments of the folders, as "HASH, DATE"; "": none, or git does not know."""
-    command = ["git", "-C", root, "log", "-1", "-G", CODE, "--format=%h, %cs", f"{commit}..HEAD", "--", *folders]
+def git(root, *words):
+    """Lines that git prints; none where there is no git, no history, or no such commit."""
     try:
-        return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
-    except FileNotFoundError:  # no git
+        return subprocess.run(["git", "-C", root, *words], capture_output=True, text=True, check=False).stdout.splitlines()
+    except FileNotFoundError:
+        return []
+
+
+@functools.cache
+def history(root):
+    """All commits, the newest first: {hash: ("HASH, DATE", files of which it changed more than comments)}."""
+    commits = {}
+    for line in git(root, "log", "-G", CODE, "--name-only", "--format=%x00%H %h, %cs"):
+        if line.startswith("\0"):
+            commit, name = line[1:].split(" ", 1)
+            commits[commit] = (name, [])
+        elif line:
+            commits[commit][1].append(line)
+    return commits
+
+
+@functools.cache
+def since(commit, root):
+    """Hashes of the commits after this one, and how many of them changed the bits of recorded runs."""
+    hashes = git(root, "rev-list", f"{commit}..HEAD")
+    return set(hashes), len(git(root, "rev-list", f"{commit}..HEAD", "--", BITS)) if hashes else 0
+
+
+def later(commit, folders, root=ROOT):
+    """What has changed the folders since, in words; "": nothing has, or git does not know."""
+    after, bits = since(commit, root)
+    found = [name for hash_, (name, files) in history(root).items()
+             if hash_ in after and any(file.startswith(tuple(folders)) for file in files)] if after else []
+    if not found:
         return ""
+    count = "one commit has" if len(found) == 1 else f"{len(found)} commits have"
+    times = {0: "have not changed", 1: "have changed once"}.get(bits, f"have changed {bits} times")
+    return f"{count} changed it since, the last {found[0]}; the bits of recorded runs {times}"
 
 
 def tables(markdown, root=ROOT):
-    """Each paragraph "Measured:" whose code has changed since: (match, later commit)."""
+    """Each paragraph "Measured:" whose code has changed since: (match, what has changed it)."""
     for match in MEASURED.finditer(markdown):
-        commit = later(match[1], re.findall(r"`([^`]+)`", match[2]), root)
-        if commit:
-            yield match, commit
+        if COMPARED in " ".join(match[0].split()):
+            continue
+        changes = later(match[1], re.findall(r"`([^`]+)`", match[2]), root)
+        if changes:
+            yield match, changes
 
 
 class Claim:
@@ -95,8 +133,8 @@ def claims(page):
 
 def marked(markdown, root=ROOT):
     """The page with a remark below each such paragraph."""
-    for match, commit in reversed(list(tables(markdown, root))):
-        remark = f"\n\n**Older than the code**, which commit {commit}, has changed since."
+    for match, changes in reversed(list(tables(markdown, root))):
+        remark = f"\n\n**Older than the code**: {changes}."
         markdown = markdown[:match.end()] + remark + markdown[match.end():]
     return markdown
 
@@ -105,6 +143,6 @@ if __name__ == "__main__":
     for page in sys.argv[1:] or sorted(glob.glob(f"{ROOT}/docs/results/*.md")):
         with open(page, encoding="utf-8") as file:
             text = file.read()
-        for found, commit in tables(text):
+        for found, changes in tables(text):
             line = text.count("\n", 0, found.start()) + 1
-            print(f"{os.path.relpath(page, ROOT)}:{line}: older than the code, which commit {commit}, has changed")
+            print(f"{os.path.relpath(page, ROOT)}:{line}: older than the code: {changes}")

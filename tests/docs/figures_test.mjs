@@ -110,10 +110,10 @@ test('a table is told to be older than the code once a folder of its line has ch
   };
   const told = () => execFileSync('python3', [join(folder, 'docs/site/older.py')], {encoding: 'utf8'});
   try {
-    for (const part of ['docs/site', 'docs/results', 'gait', 'arms']) mkdirSync(join(folder, part), {recursive: true});
+    for (const part of ['docs/site', 'docs/results', 'deploy/bits', 'gait', 'arms']) mkdirSync(join(folder, part), {recursive: true});
     cpSync(join(root, 'docs/site/older.py'), join(folder, 'docs/site/older.py'));
-    const page = (commit) => writeFileSync(join(folder, 'docs/results/a.md'),
-        `# A\n\n| a |\n|---|\n| 1 |\n\nMeasured: ${commit}, 2026-11-26, seed 1, any machine,\nof \`gait/\`, \`legs/\`: \`poise\`.\n`);
+    const page = (commit, end = '') => writeFileSync(join(folder, 'docs/results/a.md'),
+        `# A\n\n| a |\n|---|\n| 1 |\n\nMeasured: ${commit}, 2026-11-26, seed 1, any machine,\nof \`gait/\`, \`legs/\`: \`poise\`.${end}\n`);
     page('0123abc');
     assert.equal(told(), '', 'without a history');
     git('init', '-q');
@@ -121,8 +121,17 @@ test('a table is told to be older than the code once a folder of its line has ch
     change('arms/a');
     change('gait/b', '// A comment.\n');
     assert.equal(told(), '', 'another folder, and a comment');
+    const before = change('deploy/bits/push.bytes');
+    page(before);
+    const first = change('gait/a');
+    const say = (count, commit, bits) => new RegExp(`^docs/results/a.md:7: older than the code: ${count} changed it since, ` +
+        `the last ${commit}, \\d{4}-\\d\\d-\\d\\d; the bits of recorded runs have ${bits}\n$`);
+    assert.match(told(), say('one commit has', first, 'not changed'));
+    change('deploy/bits/push.bytes');
     const last = change('gait/a');
-    assert.match(told(), new RegExp(`^docs/results/a.md:7: older than the code, which commit ${last}, \\d{4}-\\d\\d-\\d\\d, has changed\n$`));
+    assert.match(told(), say('2 commits have', last, 'changed once'));
+    page(before, ' Compared by the\ntests.');
+    assert.equal(told(), '', 'a test makes it anew');
     page('0123abc');
     assert.equal(told(), '', 'a commit that is not of this history');
     page(last);
