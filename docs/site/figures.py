@@ -602,7 +602,7 @@ WITHOUT = {  # tables of no reader, and why
     ("gains", "Stiffness and damping"): "its fields stand in the lab, and energy above 30 Hz is no metric",
     ("speed", "Replay and export"): "its rows need a run in real processes, RUN: run the rows by hand",
     ("speed", "A run's page"): "times of a machine and a browser: run the rows by hand",
-    ("real_time", "A hundred faults"): "real time on a machine that is kept busy on purpose: run the rows by hand",
+    ("real_time", "In a hundred faults"): "real time on a machine that is kept busy on purpose: run the rows by hand",
     ("real_time", "From sensors"): "real time of an idle and a busy machine: run its command by hand",
     ("real_time", "A Python controller"): "times of a machine and of an installed package: run its command by hand",
     ("speed", "An hour in one process"): "times of a machine, with logs of 13 GB: run the rows by hand",
