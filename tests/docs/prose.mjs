@@ -51,7 +51,11 @@ export function sentencesOf(lines) {
 /** A line as it is read: a link's target is no part of it. */
 const asRead = (text) => text.replace(/\]\([^)]*\)/g, ']');
 
-/** What of a page is longer than it may be: lines (a table's are longer), sentences, their average, the page. */
+/** Numbers a sentence; those of equations, "(24)", and of names, "G1", are none. */
+const numbersOf = (sentences) => sentences.flatMap(({text}) => text.match(/(?<![\p{L}\p{N}_.,(])\d[\d.,]*(?![\p{L}\p{N})])/gu) ?? [])
+    .length / Math.max(sentences.length, 1);
+
+/** What of a page is longer than it may be: lines (a table's are longer), sentences, their average, the page; and numbers a sentence. */
 export function tooLong(page, lines, most) {
   const problems = [];
   const sentences = sentencesOf(lines);
@@ -59,6 +63,8 @@ export function tooLong(page, lines, most) {
   const count = lines.at(-1)?.text === '' ? lines.length - 1 : lines.length;
   if (count > most.lines) problems.push(`${page}: has ${count} lines, at most ${most.lines}`);
   if (average > most.average) problems.push(`${page}: has ${average.toFixed(1)} words a sentence, at most ${most.average}`);
+  const numbers = numbersOf(sentences);
+  if (numbers > most.numbers) problems.push(`${page}: has ${numbers.toFixed(2)} numbers a sentence, at most ${most.numbers}: put them into a table`);
   for (const {number, text, words} of sentences) {
     if (words > most.words) problems.push(`${page}:${number}: ${words} words, at most ${most.words}: ${text}`);
   }
@@ -70,10 +76,12 @@ export function tooLong(page, lines, most) {
   return problems;
 }
 
-/** Of a page: {lines, sentences, average, longest}. */
+/** Of a page: {lines, sentences, average (words a sentence), longest, numbers (a sentence)}. */
 export function measureOf(page) {
   const lines = linesOf(page);
-  const words = sentencesOf(lines).map((s) => s.words);
+  const sentences = sentencesOf(lines);
+  const words = sentences.map((s) => s.words);
   return {lines: lines.at(-1)?.text === '' ? lines.length - 1 : lines.length, sentences: words.length,
-    average: words.reduce((a, b) => a + b, 0) / Math.max(words.length, 1), longest: Math.max(0, ...words)};
+    average: words.reduce((a, b) => a + b, 0) / Math.max(words.length, 1), longest: Math.max(0, ...words),
+    numbers: numbersOf(sentences)};
 }
