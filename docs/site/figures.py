@@ -228,7 +228,7 @@ def _(task):
     each_column(task, SECTIONS.values(), make)
 
 
-@reads_row("estimation", "What that gains")
+@reads_row("estimation", "With its load known")
 def _(task, i, _, cells):
     for place, limit in enumerate(task.command(task.told(), flags(cells)).table("limits.csv"), 1):
         task.put(i, place, limit["sim.push[0].peak"])

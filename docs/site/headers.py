@@ -66,7 +66,7 @@ def reference():
         about, lines = re.match(r"((?://.*\n)*)([\s\S]*)", path.read_text("utf-8")).groups()
         found = {"": []}  # what has no heading of its own stands first
         for comment, code in declarations(lines.split("\n")):
-            found.setdefault(name_of(code), []).extend([prose(comment), f"```cpp\n{PRIVATE.sub('', code)}\n```"])
+            found.setdefault(name_of(code), []).extend([prose(comment), f"```cpp\n{re.sub(r'///<?', '//', PRIVATE.sub('', code))}\n```"])
         headers[str(path.relative_to(ROOT))] = (page, heading("##", f"`{path.name}`"), names := {})
         text += [prose(line[3:] for line in about.split("\n")), *found.pop("")]
         for name in filter(None, found):
