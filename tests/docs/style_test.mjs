@@ -36,6 +36,22 @@ for (const page of short) {
   });
 }
 
+test('the pages of a folder together', (t) => {
+  const folders = new Map();
+  for (const page of short) {
+    const name = /^docs\/[\w-]+(?=\/)/.exec(page)?.[0] ?? 'elsewhere';
+    folders.set(name, [...(folders.get(name) ?? []), measureOf(page)]);
+  }
+  for (const [name, measures] of [...folders].sort()) {
+    const sum = (value) => measures.reduce((total, m) => total + value(m), 0);
+    const sentences = sum((m) => m.sentences);
+    const average = sum((m) => m.average * m.sentences) / sentences;
+    t.diagnostic(`${name}: ${measures.length} pages, ${sum((m) => m.lines)} lines, ${average.toFixed(1)} words and ` +
+        `${(sum((m) => m.numbers * m.sentences) / sentences).toFixed(2)} numbers a sentence`);
+    assert.ok(average <= MOST.average, name);
+  }
+});
+
 /** Words of a diary; what was tried stands in the lab. */
 const DIARY = new RegExp(['[Ss]ince [0-9a-f]{7}\\b', '(older|earlier|old) (commit|state)\\b', 'mended', '[Ww]e (take|took|have|had)\\b', 'for now\\b',
   'until now', '(are|is) [^.|]{1,30} since[,.;|]', '\\d before[.;|)]', '[Tt]he house\\b', 'used to be'].map((w) => `\\b${w}`).join('|'));
