@@ -17,7 +17,7 @@ import {linesOf, repositoryFiles, root} from './markdown.mjs';
 const {values: options} = parseArgs({options: {poise: {type: 'string'}, web: {type: 'string'}, pictures: {type: 'string'}}});
 const KATEX = '/usr/share/javascript/katex/katex.js';
 const WIDTHS = [1400, 400];  // CSS pixels: a desk's screen and a phone's
-const MOST = 40e6;  // bytes: every page holds the whole navigation, and grows with it
+const MOST = 32e6;  // bytes: every page holds the whole navigation, and grows with it
 
 const modules = spawnSync('/usr/bin/python3', ['-c', 'import material, mkdocs_literate_nav, mkdocstrings_handlers, pymdownx'],
     {encoding: 'utf8', env: {...process.env, PYTHONPATH: '/usr/share/mkdocs/themes', PYTHONDONTWRITEBYTECODE: '1'}});
