@@ -60,7 +60,7 @@ class RowFiller : public ScalarVisitor {
 };
 
 /// A channel as it is read.
-struct Lane {
+struct ChannelRead {
   std::string name;
   const MessageType* type;
   std::optional<PacketFilter> filter;  ///< none: HEALTH_*, checked as it is decoded, and DERIVED
@@ -70,31 +70,33 @@ struct Lane {
   std::vector<bool> seen = {};  ///< by tick
 };
 
-std::optional<int64_t> TickOf(const RunRecord& run, const Lane& lane, bool derived,
+std::optional<int64_t> TickOf(const RunRecord& run, const ChannelRead& channel, bool derived,
                               const LogEvent& event) {
-  if (derived) return LogMessages::Tick(*lane.type, event);
-  if (!lane.filter) {
+  if (derived) return LogMessages::Tick(*channel.type, event);
+  if (!channel.filter) {
     health_t message;
     const bool good = DecodeChecked(event.data, &message) && message.run_id == run.spec.run_id();
     return good ? std::optional(message.tick) : std::nullopt;
   }
-  if (lane.filter->Check(event.data.data(), event.data.size(), 0, run.num_ticks - 1) !=
+  if (channel.filter->Check(event.data.data(), event.data.size(), 0, run.num_ticks - 1) !=
       PacketVerdict::kAccepted) {
     return {};
   }
-  if (!lane.external) return lane.filter->tick(event.data.data());
+  if (!channel.external) return channel.filter->tick(event.data.data());
   return static_cast<int64_t>(
       std::llround(static_cast<double>(event.utime) * 1e-6 / run.spec.tick_period()));
 }
 
 /// The channels that have messages in `rows`.
-std::vector<Lane> ReadLanes(const std::string& path, const RunRecord& run, const PageRows& rows) {
-  std::vector<Lane> lanes;
+std::vector<ChannelRead> ReadChannels(const std::string& path, const RunRecord& run,
+                                      const PageRows& rows) {
+  std::vector<ChannelRead> channels;
   std::map<std::string, size_t, std::less<>> index;
   const auto add = [&](const std::string& name, const MessageType& type,
                        std::optional<PacketFilter> filter, bool external) {
-    const auto [place, added] = index.try_emplace(name, lanes.size());
-    if (added) lanes.push_back({name, &type, std::move(filter), external, RowFiller(&type, &rows)});
+    const auto [place, added] = index.try_emplace(name, channels.size());
+    if (added)
+      channels.push_back({name, &type, std::move(filter), external, RowFiller(&type, &rows)});
     return place;
   };
   for (const Channel& channel : run.spec.graph().channel()) {
@@ -112,25 +114,26 @@ std::vector<Lane> ReadLanes(const std::string& path, const RunRecord& run, const
       const char* const type = derived ? MessageTraits<derived::signals_t>::kName : "health_t";
       found = add(std::string(event.channel), *FindMessageType(type), {}, false);
     }
-    Lane& lane = lanes[found->second];
-    const std::optional<int64_t> tick = TickOf(run, lane, derived, event);
+    ChannelRead& channel = channels[found->second];
+    const std::optional<int64_t> tick = TickOf(run, channel, derived, event);
     if (!tick || *tick < 0 || *tick >= run.num_ticks) continue;
     const auto i = static_cast<size_t>(*tick);
-    if (i >= lane.seen.size()) lane.seen.resize(i + 1);
-    if (lane.seen[i] || !lane.filler.BeginMessage(*tick)) continue;
-    const std::span<const uint8_t> data = WithoutUntold(*lane.type, event.data, &told);
-    lane.seen[i] = lane.type->visit(data.data(), static_cast<int64_t>(data.size()), &lane.filler);
-    lane.messages += lane.seen[i] ? 1 : 0;
+    if (i >= channel.seen.size()) channel.seen.resize(i + 1);
+    if (channel.seen[i] || !channel.filler.BeginMessage(*tick)) continue;
+    const std::span<const uint8_t> data = WithoutUntold(*channel.type, event.data, &told);
+    channel.seen[i] =
+        channel.type->visit(data.data(), static_cast<int64_t>(data.size()), &channel.filler);
+    channel.messages += channel.seen[i] ? 1 : 0;
   }
-  std::erase_if(lanes, [](const Lane& lane) { return lane.messages == 0; });
-  for (Lane& lane : lanes) {
+  std::erase_if(channels, [](const ChannelRead& channel) { return channel.messages == 0; });
+  for (ChannelRead& channel : channels) {
     // A derived signal that a run never tells is none.
-    if (std::string_view(lane.type->name) != MessageTraits<derived::signals_t>::kName) continue;
-    std::erase_if(lane.filler.columns(), [](const SignalColumn& column) {
+    if (std::string_view(channel.type->name) != MessageTraits<derived::signals_t>::kName) continue;
+    std::erase_if(channel.filler.columns(), [](const SignalColumn& column) {
       return std::ranges::all_of(column.values, [](double value) { return std::isnan(value); });
     });
   }
-  return lanes;
+  return channels;
 }
 
 }  // namespace
@@ -145,18 +148,18 @@ bool IsSignal(const MessageType& type, std::string_view path) {
 std::vector<ChannelColumns> ReadColumns(const std::string& path, const RunRecord& run) {
   const PageRows rows(0, run.num_ticks);
   std::vector<ChannelColumns> channels;
-  for (Lane& lane : ReadLanes(path, run, rows)) {
+  for (ChannelRead& channel : ReadChannels(path, run, rows)) {
     std::vector<int64_t> ticks;
-    for (size_t tick = 0; tick < lane.seen.size(); ++tick) {
-      if (lane.seen[tick]) ticks.push_back(static_cast<int64_t>(tick));
+    for (size_t tick = 0; tick < channel.seen.size(); ++tick) {
+      if (channel.seen[tick]) ticks.push_back(static_cast<int64_t>(tick));
     }
-    for (SignalColumn& column : lane.filler.columns()) {
+    for (SignalColumn& column : channel.filler.columns()) {
       std::vector<double> values;
       for (const int64_t tick : ticks) values.push_back(column.values[static_cast<size_t>(tick)]);
       column.values = std::move(values);
     }
-    channels.push_back({lane.name, lane.type->name, lane.messages, std::move(ticks),
-                        std::move(lane.filler.columns())});
+    channels.push_back({channel.name, channel.type->name, channel.messages, std::move(ticks),
+                        std::move(channel.filler.columns())});
   }
   return channels;
 }
@@ -164,9 +167,12 @@ std::vector<ChannelColumns> ReadColumns(const std::string& path, const RunRecord
 std::vector<ChannelColumns> ReadRows(const std::string& path, const RunRecord& run,
                                      const PageRows& rows) {
   std::vector<ChannelColumns> channels;
-  for (Lane& lane : ReadLanes(path, run, rows)) {
-    channels.push_back(
-        {lane.name, lane.type->name, lane.messages, {}, std::move(lane.filler.columns())});
+  for (ChannelRead& channel : ReadChannels(path, run, rows)) {
+    channels.push_back({channel.name,
+                        channel.type->name,
+                        channel.messages,
+                        {},
+                        std::move(channel.filler.columns())});
   }
   return channels;
 }

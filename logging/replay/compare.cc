@@ -15,12 +15,12 @@ namespace poise::logging {
 namespace {
 
 /// Messages by tick and channel index; the spans live as long as the reader.
-struct Messages {
+struct MessagesByTick {
   LogReader reader;
   RunSpec spec;
   std::map<std::pair<int64_t, int>, std::span<const uint8_t>> by_tick;
 
-  explicit Messages(const std::string& path) : reader(path) {
+  explicit MessagesByTick(const std::string& path) : reader(path) {
     spec = FindRunInfo(&reader, path).spec;
     std::map<std::string, int, std::less<>> index;
     for (int i = 0; i < spec.graph().channel_size(); ++i) {
@@ -55,8 +55,8 @@ void DescribeField(const MessageType& type, std::span<const uint8_t> a, std::spa
 }  // namespace
 
 LogComparison CompareLogs(const std::string& first, const std::string& second) {
-  const Messages a(first);
-  const Messages b(second);
+  const MessagesByTick a(first);
+  const MessagesByTick b(second);
   const auto& graph = a.spec.graph();
   bool same_channels = graph.channel_size() == b.spec.graph().channel_size();
   for (int i = 0; same_channels && i < graph.channel_size(); ++i) {
