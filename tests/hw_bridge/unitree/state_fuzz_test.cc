@@ -46,7 +46,7 @@ class Wire {
     dds_qos_t* const qos = dds_create_qos();
     dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, DDS_SECS(1));
     const dds_entity_t topic =
-        dds_create_topic(participant_.entity(), &unitree::DescriptorOf<LowState>(),
+        dds_create_topic(participant_.entity(), unitree::kDescriptor<LowState>,
                          unitree::kStateTopic, nullptr, nullptr);
     const dds_entity_t reader = dds_create_reader(participant_.entity(), topic, qos, nullptr);
     const dds_entity_t writer = dds_create_writer(participant_.entity(), topic, qos, nullptr);
