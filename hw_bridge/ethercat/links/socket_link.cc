@@ -61,8 +61,7 @@ UdpLink::UdpLink(const UdpConfig& config, Side side) : listen_(side == Side::kSl
                      : listen_   ? bind(socket_, raw, sizeof(address))
                                  : connect(socket_, raw, sizeof(address));
   if (result != 0) {
-    const int error = errno;
-    if (socket_ >= 0) close(socket_);
+    const int error = errno;  // ~SocketLink closes the socket
     throw EthercatError("EtherCAT over UDP: cannot {} {}:{}: {}{}", listen_ ? "listen at" : "reach",
                         config.address(), config.port(), std::strerror(error),
                         error == EADDRINUSE ? "; give another port" : "");
@@ -98,8 +97,6 @@ size_t UdpLink::Receive(std::span<uint8_t> frame, int64_t deadline) {
 
 RawLink::RawLink(const std::string& interface, Side side) : side_(side) {
   const auto fail = [&](std::string_view problem) {
-    if (socket_ >= 0) close(socket_);
-    socket_ = -1;
     throw EthercatError("EtherCAT on interface \"{}\": {}", interface, problem);
   };
   // Protocol 0 until bind(): a socket with one takes the frames of every interface meanwhile.
