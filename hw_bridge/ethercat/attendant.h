@@ -16,8 +16,15 @@ namespace poise::ethercat {
 
 /// What a slave has shown of late; written by the attendant's thread alone.
 struct SlaveDiagnosis {
-  uint8_t al_status() const { return static_cast<uint8_t>(al.load()); }
-  uint16_t al_code() const { return static_cast<uint16_t>(al.load() >> 16); }
+  struct Al {
+    uint8_t status;
+    uint16_t code;
+  };
+  /// Both of the same moment, by one load.
+  Al ReadAl() const {
+    const uint32_t both = al;
+    return {static_cast<uint8_t>(both), static_cast<uint16_t>(both >> 16)};
+  }
 
   std::atomic<bool> online{true};  ///< it answers
   /// Register 0x0130, state and 0x10 for an error, and register 0x0134 above it.

@@ -150,8 +150,9 @@ void EthercatDriveBus::Diagnose(bus_status_t* status) const {
     static const SlaveDiagnosis kNone;  // of a chain that nobody looks after
     const SlaveDiagnosis& slave = attendant != nullptr ? attendant->diagnosis(i) : kNone;
     status->online[i] = slave.online ? 1 : 0;
-    status->al_status[i] = slave.al_status();
-    status->al_code[i] = slave.al_code();
+    const SlaveDiagnosis::Al al = slave.ReadAl();
+    status->al_status[i] = al.status;
+    status->al_code[i] = al.code;
     status->error_code[i] = slave.error_code;
     status->emergency[i] = slave.emergency;
     status->emergencies[i] = slave.emergencies;
