@@ -40,7 +40,7 @@ Answer ComDifference(const RunRecord& run, int64_t t) {
   return (GetVector3(here->com_position) - GetVector3(there->com_position)).norm();
 }
 
-/// m, of what `com` gives from its reference at the run's end.
+/// mm, of what `com` gives from its reference at the end of the run.
 template <class F>
 Compute ComErrorAtEnd(const F& com) {
   return [com](const RunRecord& run) -> Answer {
