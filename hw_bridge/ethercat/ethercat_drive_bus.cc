@@ -1,7 +1,5 @@
 #include "hw_bridge/ethercat/ethercat_drive_bus.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <bit>

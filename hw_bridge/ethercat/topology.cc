@@ -1,7 +1,5 @@
 #include "hw_bridge/ethercat/topology.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 
 #include "hw_bridge/ethercat/links/link.h"

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <filesystem>
-#include <memory>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_rules.h"

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <filesystem>
-#include <memory>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/operator_acts.h"

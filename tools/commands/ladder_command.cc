@@ -1,7 +1,6 @@
 // `poise ladder`: how much of a push each rung between physics and the robot survives.
 #include <cmath>
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>

@@ -1,5 +1,4 @@
 // `poise limit`: the largest survivable value of a field, for each point of a grid.
-#include <memory>
 
 #include "fmt/format.h"
 #include "tools/charts/sweep_output.h"

@@ -6,7 +6,6 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <memory>
 
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"

@@ -1,5 +1,4 @@
 #include <filesystem>
-#include <memory>
 
 #include "fmt/format.h"
 #include "logging/printable.h"

@@ -1,5 +1,4 @@
 #include <filesystem>
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "components/framework/configuration/configuration.h"

@@ -1,5 +1,4 @@
 #include <filesystem>
-#include <memory>
 
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"

@@ -1,6 +1,5 @@
 #include <chrono>
 #include <cstdio>
-#include <memory>
 #include <thread>
 
 #include "components/framework/configuration/configuration.h"

@@ -1,4 +1,3 @@
-#include <memory>
 
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"

@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <ctime>
 #include <iostream>
-#include <memory>
 #include <set>
 
 #include "components/framework/configuration/configuration.h"

@@ -2,7 +2,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <memory>
 
 #include "components/framework/clock.h"
 #include "components/framework/configuration/configuration.h"

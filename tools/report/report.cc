@@ -12,7 +12,6 @@
 #include "logging/recording/inline_recorder.h"
 #include "tools/cli/text_table.h"
 #include "tools/report/realtime_verdict.h"
-#include "tools/scenario/scenario_loading.h"
 
 namespace poise {
 namespace {

@@ -1,7 +1,5 @@
 #include "hw_bridge/ethercat/emulator/emulated_chain.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 

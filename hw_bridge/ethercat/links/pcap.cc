@@ -1,7 +1,5 @@
 #include "hw_bridge/ethercat/links/pcap.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cerrno>
