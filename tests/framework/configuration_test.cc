@@ -207,7 +207,7 @@ TEST(FieldsByPath, AreCountedToldClearedAndMade) {
   for (const char* path : {"fail", "gains"}) EXPECT_TRUE(IsTrue(config, path)) << path;
   for (const char* path : {"gains.kp", "phase", "nothing"})
     EXPECT_FALSE(IsTrue(config, path)) << path;
-  for (const char* path : {"phase[0]", "phase.kp", "gains.kd", "nothing"}) {
+  for (const char* path : {"phase[0]", "phase.kp", "gains.kd", "nothing", "fail[0]"}) {
     EXPECT_FALSE(ClearField(&config, path)) << path;
   }
   for (const char* path : {"gains.kp", "phase", "fail"}) {

@@ -349,7 +349,8 @@ bool IsTrue(const Message& message, std::string_view path) {
 
 bool ClearField(Message* message, std::string_view path) {
   const auto [owner, field, index, plain] = Find(*message, path);
-  if (index >= 0 || !plain || CountField(*message, path) == 0) return false;
+  const bool indexed = path.find('[') != std::string_view::npos;
+  if (indexed || !plain || CountField(*message, path) == 0) return false;
   // Whoever may change the message may change what it holds.
   auto* const group = const_cast<Message*>(owner);
   group->GetReflection()->ClearField(group, field);

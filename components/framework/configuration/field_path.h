@@ -32,7 +32,8 @@ std::string ValueText(const google::protobuf::Message& message, std::string_view
 /// their defaults are.
 bool IsTrue(const google::protobuf::Message& message, std::string_view path);
 
-/// Clears the field at `path`. False: it is not set, or within a list.
+/// Clears the field at `path`, which holds no index. False: it holds one, or the field is not set
+/// or within a list.
 bool ClearField(google::protobuf::Message* message, std::string_view path);
 
 /// The group of fields at `path`, which holds no index; made where `message` has none.
