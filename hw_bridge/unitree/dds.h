@@ -54,7 +54,7 @@ class Endpoint {
   dds_entity_t topic_ = 0, entity_ = 0, waitset_ = 0;
 };
 
-/// Type descriptor of a message.
+/// Type descriptor of a message; null of a type that Unitree does not send.
 template <class T>
 inline constexpr const dds_topic_descriptor_t* kDescriptor = nullptr;
 template <>
@@ -75,6 +75,8 @@ inline constexpr const dds_topic_descriptor_t* kDescriptor<Response> =
 
 template <class T>
 class Writer : private Endpoint {
+  static_assert(kDescriptor<T> != nullptr);
+
  public:
   Writer(const Participant& participant, const char* topic, int32_t depth = 1)
       : Endpoint(participant, Kind::kWriter, *kDescriptor<T>, topic, depth) {}
@@ -85,6 +87,8 @@ class Writer : private Endpoint {
 /// Reads messages without strings and sequences, or with: those of `sample` are replaced.
 template <class T>
 class Reader : private Endpoint {
+  static_assert(kDescriptor<T> != nullptr);
+
  public:
   Reader(const Participant& participant, const char* topic, int32_t depth = 1)
       : Endpoint(participant, Kind::kReader, *kDescriptor<T>, topic, depth) {}
