@@ -86,15 +86,17 @@ TEST(Description, SaysThePortsOfEachConfiguration) {
     changes.drives = each.drives;
     changes.world = each.engine;
     changes.set = each.set;
-    const RunSetup setup = SetUpRun(each.scenario, changes);
-    const Scenario& scenario = setup.loaded.scenario;
-    for (int i = 0; i < setup.graph->num_components(); ++i) {
-      const ComponentType& type = *Components().TypeNamed(TypeOf(setup.spec.graph().component(i)));
-      EXPECT_EQ(DescribedPorts(type, scenario), ConfiguredPorts(setup.graph->component(i).wiring))
+    const LoadedScenario loaded = LoadScenario(each.scenario, changes);
+    const RunSpec spec = MakeRunSpec(loaded, changes);
+    SharedObjects shared;
+    for (int i = 0; i < spec.graph().component_size(); ++i) {
+      const ComponentType& type = *Components().TypeNamed(TypeOf(spec.graph().component(i)));
+      const ConfiguredComponent configured = ConfigureComponent(spec, i, type.make, &shared);
+      EXPECT_EQ(DescribedPorts(type, loaded.scenario), ConfiguredPorts(configured.wiring))
           << type.name << " of " << each.scenario << ' ' << each.drives;
       types.insert(type.name);
       for (const OptionalPort& port : OptionalPortsOf(type.name)) {
-        optional[type.name + "." + port.port].insert(IsThere(port, scenario));
+        optional[type.name + "." + port.port].insert(IsThere(port, loaded.scenario));
       }
     }
   }

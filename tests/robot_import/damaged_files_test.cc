@@ -40,7 +40,7 @@ fs::path Heron(const char* ending) {
 
 /// Whether a reason says where: a line, a name in quotes, "12:3:", or a field, "motor[2].joint".
 bool NamesThePlace(const std::string& reason) {
-  static const std::regex kPlace("line \\d|'|^\\d+:\\d+:|^[a-z_]+(\\[\\d+\\])?(\\.[a-z_]+)?:? ");
+  static const std::regex kPlace("line \\d|'|^(text:)?\\d+:\\d+:|^[a-z_]+(\\[\\d+\\])?(\\.[a-z_]+)?:? ");
   return std::regex_search(reason, kPlace);
 }
 
