@@ -34,7 +34,7 @@ class Words {
   void Clear(size_t first, size_t last) {
     std::memset(reinterpret_cast<std::byte*>(words_.data()) + first, 0, last - first);
   }
-  /// Of all words but the last, which has the sum.
+  /// Sums all words but the last, which has the sum.
   uint32_t Crc() const { return Crc32(std::span(words_).first(words_.size() - 1)); }
 
  private:

@@ -95,8 +95,9 @@ std::vector<ChannelRead> ReadChannels(const std::string& path, const RunRecord& 
   const auto add = [&](const std::string& name, const MessageType& type,
                        std::optional<PacketFilter> filter, bool external) {
     const auto [place, added] = index.try_emplace(name, channels.size());
-    if (added)
+    if (added) {
       channels.push_back({name, &type, std::move(filter), external, RowFiller(&type, &rows)});
+    }
     return place;
   };
   for (const Channel& channel : run.spec.graph().channel()) {

@@ -177,7 +177,7 @@ Answer NoSurfaceStops(const RunRecord& run) {
   return static_cast<double>(stops);
 }
 
-/// Of either foot.
+/// Tells whether either foot has lost its contact; nothing where neither foot is known.
 std::optional<bool> AnyContactLost(const RunRecord& run, int64_t t) {
   const auto right = ContactLost(run, 0, t), left = ContactLost(run, 1, t);
   if (!right && !left) return {};

@@ -331,8 +331,9 @@ bool HasField(const Message& message, std::string_view path) {
 std::string ValueText(const Message& message, std::string_view path) {
   const auto [owner, field, index, plain] = Find(message, path);
   std::string text;
-  if (!HasField(message, path) || field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE)
+  if (!HasField(message, path) || field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) {
     return text;
+  }
   google::protobuf::TextFormat::PrintFieldValueToString(
       *owner, field, field->is_repeated() ? std::max(index, 0) : -1, &text);
   return text;
