@@ -82,7 +82,10 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   footstep_report_ =
       FootstepReport(has_recovery_ ? &recovery_ : nullptr, walks_quasi_static_ ? &walk_ : nullptr);
   walk_commands_ = WalkCommands(config.walk());
-  for (const std::string& text : WalkWarnings(config.walk(), *model_)) wiring->AddWarning(text);
+  const stepping::StepChoice& choice = walks_quasi_static_ ? walk_.choice() : recovery_.choice();
+  for (const std::string& text : WalkWarnings(config.walk(), *model_, choice)) {
+    wiring->AddWarning(text);
+  }
   state_ = robot::RobotState(model_->num_joints());
   in_contact_ = ContactsOf(config.phase(0).support());
 

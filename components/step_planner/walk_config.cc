@@ -15,7 +15,7 @@
 #include "components/robot/sole.h"
 #include "components/step_planner/legs/leg_limits.h"
 #include "components/step_planner/planner_config.h"
-#include "components/step_planner/recovery_config.h"
+#include "components/step_planner/stepping/recovery.h"
 
 namespace poise {
 namespace {
@@ -127,9 +127,10 @@ struct StrideSize {
   std::array<const char*, 3> limit;   ///< what says so, of each
 };
 
-StrideSize QuasiStaticStride(const WalkConfig& config, const robot::RobotModel& model) {
+StrideSize QuasiStaticStride(const WalkConfig& config, const robot::RobotModel& model,
+                             const stepping::StepChoice& choice) {
   const stepping::QuasiStaticSpec spec =
-      MakeQuasiStaticSpec(config, ContactConfirmation(), model, MakeWalkChoice(config, model));
+      MakeQuasiStaticSpec(config, ContactConfirmation(), model, choice);
   return {spec.step.longest,
           spec.step.widest,
           spec.step.most_turn,
@@ -137,8 +138,7 @@ StrideSize QuasiStaticStride(const WalkConfig& config, const robot::RobotModel& 
           {"`longest` allows", "the legs span", "a foot turns"}};
 }
 
-StrideSize DynamicStride(const robot::RobotModel& model) {
-  const stepping::StepLimits limits = MakeStepChoice(model).limits();
+StrideSize DynamicStride(const robot::RobotModel& model, const stepping::StepLimits& limits) {
   const double frequency = std::sqrt(robot::kGravity / robot::StandingHeight(model));
   return {limits.longest,
           limits.widest,
@@ -269,7 +269,8 @@ stepping::QuasiStaticWalk MakeQuasiStaticWalk(const WalkConfig& config,
   return {choice, MakeQuasiStaticSpec(config, contact, model, choice)};
 }
 
-std::vector<std::string> WalkWarnings(const WalkConfig& config, const robot::RobotModel& model) {
+std::vector<std::string> WalkWarnings(const WalkConfig& config, const robot::RobotModel& model,
+                                      const stepping::StepChoice& choice) {
   std::vector<std::string> warnings;
   if (!config.enabled()) {
     if (config.command_size() > 0) {
@@ -280,8 +281,8 @@ std::vector<std::string> WalkWarnings(const WalkConfig& config, const robot::Rob
   if (config.stride_port() && config.command_size() > 0) {
     warnings.emplace_back("walk.command has no effect with walk.stride_port=true");
   }
-  const StrideSize size =
-      config.quasi_static() ? QuasiStaticStride(config, model) : DynamicStride(model);
+  const StrideSize size = config.quasi_static() ? QuasiStaticStride(config, model, choice)
+                                                : DynamicStride(model, choice.limits());
   for (int i = 0; i < config.command_size(); ++i) {
     const WalkCommandConfig& command = config.command(i);
     if (command.stop()) continue;

@@ -31,7 +31,10 @@ stepping::QuasiStaticWalk MakeQuasiStaticWalk(const WalkConfig& config,
                                               const robot::RobotModel& model);
 
 /// What this robot will not walk as it is configured, and settings without effect: a sentence each.
-std::vector<std::string> WalkWarnings(const WalkConfig& config, const robot::RobotModel& model);
+/// `choice`: of the walk's steps, MakeWalkChoice's where it is quasi-static, else MakeStepChoice's;
+/// not looked at without walk.enabled.
+std::vector<std::string> WalkWarnings(const WalkConfig& config, const robot::RobotModel& model,
+                                      const stepping::StepChoice& choice);
 
 /// What is commanded at a time of the run, after a number of steps.
 class WalkCommands {

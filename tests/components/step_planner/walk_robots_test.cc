@@ -82,6 +82,11 @@ robot::RobotModel Crouched() {
 }
 
 /// A quasi-static walk with the shipped numbers.
+std::vector<std::string> Warnings(const WalkConfig& config, const robot::RobotModel& model) {
+  return WalkWarnings(
+      config, model, config.quasi_static() ? MakeWalkChoice(config, model) : MakeStepChoice(model));
+}
+
 WalkConfig Enabled() {
   WalkConfig config;
   config.set_enabled(true);
@@ -253,19 +258,19 @@ TEST(WalkLimits, AVelocityThatNoStepReachesAndWhatHasNoEffectAreTold) {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
   WalkConfig config = Enabled();
   config.add_command()->set_vx(0.08);
-  EXPECT_TRUE(WalkWarnings(config, model).empty());
+  EXPECT_TRUE(Warnings(config, model).empty());
   config.mutable_command(0)->set_vx(-0.5);
-  ASSERT_EQ(WalkWarnings(config, model).size(), 1);
-  EXPECT_NE(WalkWarnings(config, model)[0].find("walked at -0.0862 m/s"), std::string::npos);
+  ASSERT_EQ(Warnings(config, model).size(), 1);
+  EXPECT_NE(Warnings(config, model)[0].find("walked at -0.0862 m/s"), std::string::npos);
   config.set_longest(0.2);
   config.set_gap(0.05);
   config.set_quasi_static(false);
-  const std::vector<std::string> warnings = WalkWarnings(config, model);
+  const std::vector<std::string> warnings = Warnings(config, model);
   ASSERT_EQ(warnings.size(), 2);
   EXPECT_NE(warnings[0].find("walk.longest has no effect"), std::string::npos) << warnings[0];
   EXPECT_NE(warnings[1].find("walk.gap has no effect"), std::string::npos) << warnings[1];
   config.mutable_command(0)->set_vx(5);
-  EXPECT_EQ(WalkWarnings(config, model).size(), 3);
+  EXPECT_EQ(Warnings(config, model).size(), 3);
 }
 
 TEST(WalkLimits, AsideAndInATurnOnlyEverySecondStepGoesOut) {
@@ -275,10 +280,10 @@ TEST(WalkLimits, AsideAndInATurnOnlyEverySecondStepGoesOut) {
   WalkCommandConfig* command = config.add_command();
   command->set_vy(0.0206);
   command->set_wz(-0.0603);
-  EXPECT_TRUE(WalkWarnings(config, model).empty());
+  EXPECT_TRUE(Warnings(config, model).empty());
   command->set_vy(0.021);
   command->set_wz(-0.061);
-  const std::vector<std::string> warnings = WalkWarnings(config, model);
+  const std::vector<std::string> warnings = Warnings(config, model);
   ASSERT_EQ(warnings.size(), 2);
   EXPECT_NE(warnings[0].find("vy=0.021 is walked at 0.0207 m/s"), std::string::npos) << warnings[0];
   EXPECT_NE(warnings[1].find("wz=-0.061 is walked at -0.0603 rad/s"), std::string::npos)
@@ -288,10 +293,10 @@ TEST(WalkLimits, AsideAndInATurnOnlyEverySecondStepGoesOut) {
 TEST(WalkLimits, CommandsOfAWalkThatIsOffAreTold) {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
   WalkConfig config;
-  EXPECT_TRUE(WalkWarnings(config, model).empty());
+  EXPECT_TRUE(Warnings(config, model).empty());
   config.add_command()->set_vx(0.1);
-  ASSERT_EQ(WalkWarnings(config, model).size(), 1);
-  EXPECT_NE(WalkWarnings(config, model)[0].find("walk.enabled=true"), std::string::npos);
+  ASSERT_EQ(Warnings(config, model).size(), 1);
+  EXPECT_NE(Warnings(config, model)[0].find("walk.enabled=true"), std::string::npos);
 }
 
 }  // namespace
