@@ -67,7 +67,7 @@ const isWhatIsDrawn = (...pictures) => {
 };
 
 test('the moving pictures of the mathematics are what animate.py draws', () => {
-  isWhatIsDrawn('messages', 'oblique', 'answers', 'stick_slip', 'rounding');
+  isWhatIsDrawn('frames', 'messages', 'oblique', 'answers', 'stick_slip', 'rounding');
 });
 
 test('the moving pictures of a push are what animate.py draws', (t) => {

@@ -18,7 +18,7 @@ from fractions import Fraction
 import numpy as np
 
 import poise
-from draw import HEIGHT, OMEGA, TICK, Axes, Picture, keep, number, span
+from draw import HALF_LENGTH, HALF_WIDTH, HEIGHT, OMEGA, SOLE_Y, TICK, Axes, Picture, keep, number, span
 
 FRAMES = 12  # a second of the picture
 WIDTH, HEIGHT_OF_FILM = 640, 330
@@ -355,6 +355,55 @@ def pixels(axes, x, y):
     return np.array([axes.at(a, b) for a, b in zip(x, y)])
 
 
+def frames():
+    """The left foot goes ahead and turns, and the load goes over and back: what frame O and the wrenches' signs make of both."""
+    film = Film("frames", "Frame O follows the soles, and the centre of pressure in it follows the load", 5, 290)
+    wave = 0.5 - 0.5 * np.cos(2 * math.pi * film.at / film.length)
+    right = np.tile([0, -SOLE_Y], (film.count, 1))  # x, y of its centre, m
+    left, turn = np.stack([0.07 * wave, SOLE_Y + 0.01 * wave], -1), 0.3 * wave  # m, rad
+    share = (0.85 - 0.7 * wave)[:, None]  # η of the right foot
+    middle = (right + left) / 2  # O
+    y = (left - right) / np.linalg.norm(left - right, axis=1, keepdims=True)
+    x = np.stack([y[:, 1], -y[:, 0]], -1)
+
+    def plan(place):
+        return np.array([160, 163]) - 540 * place[:, ::-1]
+
+    def frame(place, ahead, aside, style, length):
+        for way in (ahead, aside):
+            film.arrow(plan(place), plan(place + length * way) - plan(place), style)
+
+    for place, angle in ((right, 0 * turn), (left, turn)):
+        ahead, aside = np.stack([np.cos(angle), np.sin(angle)], -1), np.stack([-np.sin(angle), np.cos(angle)], -1)
+        corners = ((1, 1), (1, -1), (-1, -1), (-1, 1))
+        film.line(np.stack([plan(place + a * HALF_LENGTH * ahead + b * HALF_WIDTH * aside) for a, b in corners], 1), "ff", close=True)
+        frame(place, ahead, aside, "c", 0.06)
+    frame(middle, x, y, "b", 0.09)
+    film.dot(plan(share * right + (1 - share) * left), "fi")  # M_x of (35) is the sum of y F_z
+    film.picture.text(160, 28, "from above", "s", "middle")
+    for column, (style, text) in enumerate((("fc", "frames of the soles"), ("fb", "frame O"), ("fi", "its CoP"))):
+        at = (30, 165, 240)[column]
+        film.picture.dot(at, 274, style)
+        film.picture.text(at + 8, 278, text, "s")
+
+    floor = 165
+    film.picture.text(480, 28, "from behind, each foot's F_z", "s", "middle")
+    film.picture.path([(360, floor), (600, floor)], "l")
+    for place, load, name in ((left, 1 - share, "left"), (right, share, "right")):
+        across = 480 - 560 * place[:, 1:]
+        half = 560 * HALF_WIDTH
+        film.line(np.stack([np.concatenate([across + a * half, 0 * across + floor - b], 1) for a, b in
+                            ((-1, 0), (1, 0), (1, 10), (-1, 10))], 1), "ff", close=True)
+        length = np.concatenate([0 * load, 90 * load], 1)
+        film.arrow(np.concatenate([across, 0 * across + floor], 1), length, "a")
+        film.arrow(np.concatenate([across, 0 * across + floor - 12], 1), -length, "l")
+        film.picture.text(480 - 560 * place[0, 1], 50, name, "s", "middle")
+    for at, style, text in ((360, "fa", "of F_c, on the ground: below 0"), (550, "fi", "a sensor's")):
+        film.picture.dot(at, 274, style)
+        film.picture.text(at + 8, 278, text, "s")
+    return film.picture
+
+
 def messages():
     """Where each message of a tick goes, in the order of TICK."""
     film = Film("messages", "One tick: each process computes as soon as it has all its inputs of this tick", 6)
@@ -552,7 +601,7 @@ def rounding():
     return film.picture
 
 
-FILMS = {film.__name__: film for film in (messages, oblique, answers, stick_slip, rounding)}
+FILMS = {film.__name__: film for film in (frames, messages, oblique, answers, stick_slip, rounding)}
 
 
 def main():
