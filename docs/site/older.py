@@ -2,10 +2,12 @@
 """Says which figures of docs/results/ are older than the code that they speak of, and reads the pages for deploy/results.
 
 A paragraph below each table names the commit that was measured and the folders that the figures depend on:
-"Measured: COMMIT, DATE, SEED, MACHINE, of `FOLDER/`, `FOLDER/`: COMMAND". They are older where git knows later commits
-that changed more than comments there; of a range of commits the first counts. How often the bits of the recorded runs
-have changed since tells what such changes may be worth. A table that ends with "Compared by the tests." is not older,
-since a test makes it anew. Without the repository's history nothing is said.
+"Measured: COMMIT, DATE, SEED, MACHINE, N CPU s, of `FOLDER/`, `FOLDER/`: COMMAND". N is the processor's time that its
+commands took, where it was recorded. The paragraph ends with "By hand: REASON." where the commands do not make the
+figures, and with "Compared by the tests." where a test makes them anew. Figures are older where git knows later commits
+that changed more than comments in these folders; of a range of commits the first counts. How often the bits of the
+recorded runs have changed since tells what such changes may be worth. What a test makes anew is not older. Without the
+repository's history nothing is said.
 Usage: docs/site/older.py [PAGE...]
 """
 
@@ -91,7 +93,10 @@ class Claim:
         self.first_row = begin + 2  # the number of its line, from 0
         self.measured, self.commit = match[0], match[1]
         self.machine = "any machine" if "any machine" in " ".join(match[0].split()) else "2 cores"
-        self.text = " ".join(match[3].split())
+        took = re.search(r"\b(\d+) CPU s,\s+of\s", match[0])
+        self.seconds = int(took[1]) if took else None
+        self.text, _, reason = " ".join(match[3].split()).partition(" By hand: ")
+        self.by_hand = reason.rstrip(".")  # why its figures are not made by its commands
         self.told = commands_of(self.text)
         if not self.told and re.search(r"commands? (?:above|below)", self.text):
             self.told = fenced(lines[top:begin])[-1:] or fenced(lines[end:])[:1]

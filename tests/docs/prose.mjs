@@ -51,8 +51,9 @@ export function sentencesOf(lines) {
 /** A line as it is read: a link's target is no part of it. */
 const asRead = (text) => text.replace(/\]\([^)]*\)/g, ']');
 
-/** Numbers a sentence; those of equations, "(24)", and of names, "G1", are none. */
-const numbersOf = (sentences) => sentences.flatMap(({text}) => text.match(/(?<![\p{L}\p{N}_.,(])\d[\d.,]*(?![\p{L}\p{N})])/gu) ?? [])
+/** Numbers a sentence; those of equations, "(24)", and of names, "G1", are none, nor is what a table's "Measured:" says. */
+const numbersOf = (all) => numbersIn(all.filter(({text}) => !text.startsWith('Measured: ')));
+const numbersIn = (sentences) => sentences.flatMap(({text}) => text.match(/(?<![\p{L}\p{N}_.,(])\d[\d.,]*(?![\p{L}\p{N})])/gu) ?? [])
     .length / Math.max(sentences.length, 1);
 
 /** What of a page is longer than it may be: lines (a table's are longer), sentences, their average, the page; and numbers a sentence. */
