@@ -145,9 +145,11 @@ const OURS = ['ours', 'measured'];
 const other = compared.length > 0 ? otherBits(options.poise) : undefined;
 const [printing, made] = [true, false].map((has) => compared.filter(({rows}) => rows[0].some((cell) => OURS.includes(cell)) === has));
 
+const results = (...words) => spawnSync(join(root, 'deploy/results'), words, {encoding: 'utf8', env: {...process.env, POISE: resolve(options.poise)}});
+
 /** Names of deploy/results by page and place of the table, which stand in the pages' order. */
 function claimsByTable() {
-  const {stdout} = spawnSync(join(root, 'deploy/results'), ['--list'], {encoding: 'utf8'});
+  const {stdout} = results('--list');
   const claims = [...stdout.matchAll(/^\S+/gm)].map(([name]) => name);
   const tables = pages.filter((page) => RESULTS.has(page)).flatMap((page) => tablesOf(page).map(({line}) => `${page}:${line}`));
   assert.equal(claims.length, tables.length);
@@ -158,8 +160,7 @@ for (const {page, line} of made) {
   test(`${page}:${line} has the figures that deploy/results makes`, {skip: other}, (t) => {
     const claim = claimsByTable().get(`${page}:${line}`);
     assert.ok(claim, `${page}:${line}: no table of results`);
-    const {status, stdout, stderr} = spawnSync(join(root, 'deploy/results'), [claim], {encoding: 'utf8',
-      env: {...process.env, POISE: resolve(options.poise)}});
+    const {status, stdout, stderr} = results(claim);
     assert.equal(status, 0, stdout + stderr);
     assert.doesNotMatch(stdout, /not made/);
     t.diagnostic(stdout.trim().split('\n').at(-1));
