@@ -443,7 +443,7 @@ def walking():
 
 
 def gains():
-    p = Picture("gains", "The rule for the COM's gains, and the answers of four pairs of gains", 640, 290)
+    p = Picture("gains", "The rule for the COM's gains, and the answers of three pairs of gains", 640, 290)
     axes = Axes(p, 60, 35, 235, 205, (0, 50), (0, 16))
     for omega, style, name in ((OMEGA, "b", "h = 0.75 m"), (4.59, "c", "h = 0.46 m")):
         axes.curve([(t, min(2.75 * omega, 1 / (6 * 0.7 * t * 1e-3))) for t in span(1, 50, 99)], style)
