@@ -376,7 +376,7 @@ def _(task, i, first, _):
     scenario = re.findall(r"`(\w+)`", first)[0]
     for place, more in ((1, ""), (2, FEEDBACK), (3, f"{FEEDBACK} --set redistributor.feedback.integral=25")):
         figures = task.command(task.told(), more, SCENARIO=scenario).table()[0]
-        task.put(i, place, *(figures[f"foot_force_error_{part}rms"] for part in ("", "internal_", "resultant_")))
+        task.put(i, place, *(figures[f"foot_force_error_{part}rms"] for part in ("", "internal_", "resultant_")), figures["torque_step_max"])
 
 
 @reads_row("redistribution", "The survivable push")

@@ -73,7 +73,7 @@ test('wrong figures of fast claims are told, and replaced by what a run prints',
   assert.doesNotMatch(again.stderr, /^ {2}poise /m, 'what is kept is not run again');
   const today = new Date().toISOString().slice(0, 10);
   for (const page of [STEP, FEEDBACK]) {
-    assert.match(readFileSync(join(folder, page), 'utf8'), new RegExp(`^Measured: 0123abc, ${today}, seed 1, any machine, \\d+ CPU s,\nof `, 'm'));
+    assert.match(readFileSync(join(folder, page), 'utf8'), new RegExp(`^Measured: 0123abc, ${today}, seed 1, any machine, \\d+ CPU s,\\sof `, 'm'));
   }
   const printed = spawnSync(options.poise, ['run', 'push_double_support', '--variant', 'step', '--inline', '--no-reference', '--full',
     '--world', 'ode', '--out', join(folder, 'own')], {encoding: 'utf8', env: {...env, COLUMNS: '400', POISE_DEPLOY_DIR: join(root, 'deploy')}});
