@@ -4,7 +4,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
+
 #include "components/framework/configuration/configuration.h"
+#include "tools/benchmark/benchmark_set.h"
 
 namespace poise {
 namespace {
@@ -123,6 +127,39 @@ TEST_F(BenchmarkTableTest, AShareIsOfTheRunsThatTell) {
   result_.rows.at({1, 0}).outcome = kStopped;
   EXPECT_EQ(Figure("stand, of 1").value, 1);
   EXPECT_THAT(BenchmarkCsv({result_}), HasSubstr(",stopped,"));
+}
+
+// What is measured with a set is compared over years: a change makes another set. The sums are
+// those of the sets when each was a file of its own.
+TEST(BenchmarkSetTest, EachSetIsFixed) {
+  const std::pair<const char*, const char*> kSets[] = {
+      {"balance_1", "f9aff9fec2be91bcde81fccbdf85364470984b53"},
+      {"balance_2", "0a8da7b90aafe86f4579d540a39543ec1092b077"},
+      {"balance_3", "9370344bbf0cb6ec319f948addbcb6d76fe6534e"},
+      {"balance_4", "a107f59bbc2926a5db9632b7a0109d2497542ca5"}};
+  for (const auto& [name, sum] : kSets) {
+    EXPECT_EQ(Sha1(BenchmarkSet(name, BenchmarkSubject()).text()), sum) << name;
+  }
+}
+
+TEST(BenchmarkSetTest, AChangeThatCannotBeIsNamedByFileAndLine) {
+  const std::filesystem::path file =
+      std::filesystem::temp_directory_path() / "poise_changed_set.pbtxt";
+  const auto problem = [&](const char* change) -> std::string {
+    std::ofstream(file) << "base: \"balance_4\"\nname: \"mine\"\nset: \"" << change << "\"\n";
+    try {
+      BenchmarkSet(file.string(), BenchmarkSubject());
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(problem("part[blocks].quick=1"), "");
+  EXPECT_THAT(problem("part[block].quick=1"), HasSubstr(file.string() + ":3: set[0]: "));
+  EXPECT_THAT(problem("part[block].quick=1"), HasSubstr("no part is called 'block'"));
+  EXPECT_THAT(problem("part[blocks].quick"), HasSubstr("write FIELD=VALUE"));
+  EXPECT_THAT(problem("part[blocks].quick=0"), HasSubstr("quick"));
+  std::filesystem::remove(file);
 }
 
 }  // namespace

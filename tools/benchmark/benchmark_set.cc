@@ -14,6 +14,7 @@
 #include "fmt/format.h"
 #include "sim/start_posture.h"
 #include "tools/cli/output_place.h"
+#include "tools/scenario/based_files.h"
 #include "tools/scenario/catalog.h"
 #include "tools/scenario/graph_files.h"
 #include "tools/scenario/registry.h"
@@ -57,6 +58,30 @@ void CheckField(const std::string& where, const std::string& field) {
       "{}: {} is the benchmark's, the same for all; a controller gives its graph and the fields of "
       "its components: {}",
       where, field, fmt::join(allowed, ", ")));
+}
+
+/// The set of a file: its base's, and what the file adds to that and changes.
+Benchmark ReadSet(const fs::path& file) {
+  Benchmark merged;
+  for (const BasedFile<Benchmark>& own :
+       ReadWithBases<Benchmark>(file, "benchmarks", BaseFiles::kRefused,
+                                [](const auto&... given) { ParseTextProto(given...); })) {
+    merged.MergeFrom(own.fields);
+    for (int i = 0; i < own.fields.set_size(); ++i) {
+      const std::string& change = own.fields.set(i);
+      const size_t equals = change.find('=');
+      const std::string place = fmt::format("set[{}]", i);
+      if (equals == std::string::npos) own.Fail(place, "write FIELD=VALUE");
+      try {
+        SetField(&merged, change.substr(0, equals), change.substr(equals + 1));
+      } catch (const ConfigError& error) {
+        own.Fail(place, error.what());
+      }
+    }
+  }
+  merged.clear_base();
+  merged.clear_set();
+  return merged;
 }
 
 void CheckSet(const Benchmark& benchmark, const std::string& file) {
@@ -127,7 +152,7 @@ BenchmarkRobot ReadBenchmarkRobot(const std::string& name) {
 BenchmarkSet::BenchmarkSet(const std::string& name, const BenchmarkSubject& subject)
     : subject_(subject) {
   const std::string file = FindFile("benchmarks", name, fs::current_path()).string();
-  ReadTextProto(file, &benchmark_);
+  benchmark_ = ReadSet(file);
   CheckSet(benchmark_, file);
   text_ = TextOf(benchmark_);
   robot_ = ReadBenchmarkRobot(subject.robot);
