@@ -14,6 +14,7 @@
 #include <set>
 
 #include "components/framework/bus/packet_filter.h"
+#include "components/framework/run.h"
 #include "components/robot_files/robot_files.h"
 #include "derived/message_traits.hpp"
 #include "fmt/format.h"
@@ -203,10 +204,8 @@ void RunStore::ComputeDerived() const {
 
 RunStore::RunStore(const RunSpec& spec, std::string scenario)
     : spec_(spec), scenario_(std::move(scenario)) {
-  for (const Resource& resource : spec.resource()) {
-    if (resource.name() == "robot") robot_ = resource.text();
-    if (resource.name() == "urdf") urdf_ = resource.text();
-  }
+  robot_ = ResourceOf(spec, "robot").text();
+  urdf_ = ResourceOf(spec, "urdf").text();
   names_ = logging::ElementNames::OfSpec(spec);
   for (const Channel& channel : spec.graph().channel()) {
     const MessageType* const type = FindMessageType(channel.type());

@@ -168,12 +168,8 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
       foreign_.push_back(foreign);
     }
   }
-  std::string robot, urdf;
-  for (const Resource& resource : spec_.resource()) {
-    if (resource.name() == "robot") robot = resource.text();
-    if (resource.name() == "urdf") urdf = resource.text();
-  }
-  model_ = std::make_shared<robot::RobotModel>(robot::LoadRobotTexts(robot, urdf));
+  model_ = std::make_shared<robot::RobotModel>(
+      robot::LoadRobotTexts(ResourceOf(spec_, "robot").text(), ResourceOf(spec_, "urdf").text()));
   override_.assign(static_cast<size_t>(model_->num_joints()),
                    std::numeric_limits<double>::quiet_NaN());
   const GraphPlan& plan = runner_->plan();
@@ -361,16 +357,6 @@ void Session::NoteCuts(const bridge_status_t& status, double time) {
     if (!cut.counts()) continue;
     Cut& noted = cuts_.try_emplace(joint, Cut{time, {}}).first->second;
     if (cut.share > noted.largest.share) noted.largest = cut;
-  }
-}
-
-void Session::Inject(const std::string& channel, const std::vector<uint8_t>& bytes) {
-  const Lock lock(this);
-  if (!runner_->Inject(channel, bytes)) {
-    throw ConfigError(
-        fmt::format("{}: is no external channel that a component reads, or the "
-                    "message is not of its type",
-                    channel));
   }
 }
 

@@ -74,8 +74,6 @@ class Session {
   /// Empty: the controller's again. Throws ConfigError: not the robot's number of joints, not
   /// finite, stiffness or damping negative.
   void SetCommand(std::optional<Command> command);
-  /// Shows a message to the readers of an external channel. Throws ConfigError when it is refused.
-  void Inject(const std::string& channel, const std::vector<uint8_t>& bytes);
   /// The last message of a channel. Before the first tick those are there that come before any
   /// command: its stages up to the first replaced component, or the command's writer, are run.
   /// Throws ConfigError: no such channel, none yet.
@@ -95,8 +93,6 @@ class Session {
   const RunSpec& spec() const { return spec_; }
   /// What is odd about the scenario, and each joint whose commanded impedance the bridge has cut.
   std::vector<std::string> warnings();
-  const logging::ElementNames& names() const { return names_; }
-  std::string scenario_text() const { return scenario_; }
 
  private:
   class Lock;

@@ -1,7 +1,6 @@
 // The paper's mathematics on arrays: contacts, distribution, balancing.
 #include <algorithm>
 #include <limits>
-#include <optional>
 
 #include "components/balance/balance_control.h"
 #include "components/balance/capture_point.h"
@@ -73,190 +72,105 @@ py::array_t<double> ArrayOf(const ConvexPolygon& polygon) {
 }
 
 py::array_t<double> FrameOOf(const Array& soles, const Feet& in_contact) {
-  const py::ssize_t count = CountOf(soles);
-  CheckShape(soles, "soles", count, {2, 4, 4});
-  py::array_t<double> result({count, py::ssize_t{4}, py::ssize_t{4}});
-  const double* const from = soles.data();
-  double* const to = result.mutable_data();
-  const py::gil_scoped_release released;
-  for (py::ssize_t i = 0; i < count; ++i) {
-    Isometry3d frame;
-    Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> out(to + 16 * i);
-    if (balance::FrameO(PosesAt(from + 32 * i), in_contact, &frame)) {
-      out = frame.matrix();
-    } else {
-      out.setConstant(kNan);
-    }
-  }
-  return result;
+  return EachRow({{soles, "soles", {2, 4, 4}}}, {4, 4}, [&](Row from, double* to) {
+    Isometry3d frame = Isometry3d::Identity();
+    const bool good = balance::FrameO(PosesAt(from[0]), in_contact, &frame);
+    Put(frame.matrix(), to);
+    return good;
+  });
 }
 
 py::array_t<double> WrenchTransformOf(const Array& frame, const Array& sole) {
-  const py::ssize_t count = CountOf(frame);
-  CheckShape(frame, "frame", count, {4, 4});
-  CheckShape(sole, "sole", count, {4, 4});
-  py::array_t<double> result({count, py::ssize_t{6}, py::ssize_t{6}});
-  const double* const of = frame.data();
-  const double* const from = sole.data();
-  double* const to = result.mutable_data();
-  const py::gil_scoped_release released;
-  for (py::ssize_t i = 0; i < count; ++i) {
-    Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(to + 36 * i) =
-        balance::WrenchTransform(PoseAt(of + 16 * i), PoseAt(from + 16 * i));
-  }
-  return result;
+  return EachRow({{frame, "frame", {4, 4}}, {sole, "sole", {4, 4}}}, {6, 6},
+                 [](Row from, double* to) {
+                   return Put(balance::WrenchTransform(PoseAt(from[0]), PoseAt(from[1])), to);
+                 });
 }
 
 py::array_t<double> CopOf(const Array& wrench) {
-  const py::ssize_t count = CountOf(wrench);
-  CheckShape(wrench, "wrench", count, {6});
-  py::array_t<double> result({count, py::ssize_t{2}});
-  const double* const from = wrench.data();
-  double* const to = result.mutable_data();
-  const py::gil_scoped_release released;
-  for (py::ssize_t i = 0; i < count; ++i) {
-    Eigen::Map<Eigen::Vector2d>(to + 2 * i) = balance::CenterOfPressure(WrenchAt(from + 6 * i));
-  }
-  return result;
+  return EachRow({{wrench, "wrench", {6}}}, {2}, [](Row from, double* to) {
+    return Put(balance::CenterOfPressure(WrenchAt(from[0])), to);
+  });
 }
 
 py::array_t<double> Margins(const Array& wrench, const std::array<double, 4>& limits) {
-  const py::ssize_t count = CountOf(wrench);
-  CheckShape(wrench, "wrench", count, {6});
-  py::array_t<double> result({count, py::ssize_t{5}});
-  const double* const from = wrench.data();
-  double* to = result.mutable_data();
-  const ContactLimits of = LimitsOf(limits);
-  const py::gil_scoped_release released;
-  for (py::ssize_t i = 0; i < count; ++i) {
-    const balance::ContactMargins margins = balance::CheckContact(WrenchAt(from + 6 * i), of);
-    for (const double margin :
-         {margins.normal, margins.friction, margins.yaw, margins.roll, margins.pitch}) {
-      *to++ = margin;
-    }
-  }
-  return result;
+  return EachRow({{wrench, "wrench", {6}}}, {5}, [of = LimitsOf(limits)](Row from, double* to) {
+    const balance::ContactMargins m = balance::CheckContact(WrenchAt(from[0]), of);
+    return std::ranges::copy(std::array{m.normal, m.friction, m.yaw, m.roll, m.pitch}, to).out;
+  });
 }
 
 /// feasible, min, max, optimal and the ratio to use, a column each.
 py::array_t<double> Ratio(const Array& resultant, const Array& feet,
                           const std::array<double, 4>& limits, double least, double most) {
-  const py::ssize_t count = CountOf(resultant);
-  CheckShape(resultant, "resultant", count, {6});
-  CheckShape(feet, "feet", count, {2, 4, 4});
   if (!(least >= 0 && least <= most && most <= 1)) {
     throw py::value_error("eta_min and eta_max: must be 0 ≤ eta_min ≤ eta_max ≤ 1");
   }
-  py::array_t<double> result({count, py::ssize_t{5}});
-  const double* const of = resultant.data();
-  const double* const from = feet.data();
-  double* to = result.mutable_data();
-  const ContactLimits with = LimitsOf(limits);
-  const py::gil_scoped_release released;
-  for (py::ssize_t i = 0; i < count; ++i) {
-    const Vector6d wrench = WrenchAt(of + 6 * i);
-    const std::array<Isometry3d, 2> soles = PosesAt(from + 32 * i);
-    const balance::RatioInterval interval =
-        balance::FeasibleRatio(wrench, soles, with, least, most);
-    *to++ = interval.feasible ? 1 : 0;
-    *to++ = interval.feasible ? interval.min : kNan;
-    *to++ = interval.feasible ? interval.max : kNan;
-    *to++ = interval.optimal;
-    *to++ = balance::SelectRatio(interval, wrench, soles, with, least, most);
-  }
-  return result;
+  return EachRow({{resultant, "resultant", {6}}, {feet, "feet", {2, 4, 4}}}, {5},
+                 [=, with = LimitsOf(limits)](Row from, double* to) {
+                   const Vector6d wrench = WrenchAt(from[0]);
+                   const std::array<Isometry3d, 2> soles = PosesAt(from[1]);
+                   const balance::RatioInterval interval =
+                       balance::FeasibleRatio(wrench, soles, with, least, most);
+                   to[0] = interval.feasible ? 1 : 0;
+                   to[1] = interval.feasible ? interval.min : kNan;
+                   to[2] = interval.feasible ? interval.max : kNan;
+                   to[3] = interval.optimal;
+                   to[4] = balance::SelectRatio(interval, wrench, soles, with, least, most);
+                   return true;
+                 });
 }
 
 py::array_t<double> Distribute(const Array& resultant, const Array& feet, const Array& eta) {
-  const py::ssize_t count = CountOf(resultant);
-  CheckShape(resultant, "resultant", count, {6});
-  CheckShape(feet, "feet", count, {2, 4, 4});
-  CheckShape(eta, "eta", count, {});
-  py::array_t<double> result({count, py::ssize_t{2}, py::ssize_t{6}});
-  const double* const of = resultant.data();
-  const double* const from = feet.data();
-  const double* const ratio = eta.data();
-  double* const to = result.mutable_data();
-  const py::gil_scoped_release released;
-  for (py::ssize_t i = 0; i < count; ++i) {
-    const std::array<Vector6d, 2> shares =
-        balance::DistributeResultant(WrenchAt(of + 6 * i), PosesAt(from + 32 * i), ratio[i]);
-    Eigen::Map<Vector6d>(to + 12 * i) = shares[0];
-    Eigen::Map<Vector6d>(to + 12 * i + 6) = shares[1];
-  }
-  return result;
+  return EachRow({{resultant, "resultant", {6}}, {feet, "feet", {2, 4, 4}}, {eta, "eta", {}}},
+                 {2, 6}, [](Row from, double* to) {
+                   const std::array<Vector6d, 2> shares =
+                       balance::DistributeResultant(WrenchAt(from[0]), PosesAt(from[1]), *from[2]);
+                   return Put(shares[1], Put(shares[0], to));
+                 });
 }
 
 py::array_t<double> Redistribution(const Array& jacobian, const Array& change) {
-  const py::ssize_t count = CountOf(jacobian);
   const py::ssize_t n = jacobian.ndim() == 3 ? jacobian.shape(2) : 0;
-  CheckShape(jacobian, "contact_jacobian", count, {12, n});
-  CheckShape(change, "wrench_change", count, {12});
+  CheckShape(jacobian, "contact_jacobian", CountOf(jacobian), {12, n});
   if (n <= 6) throw py::value_error("contact_jacobian: must be 12 × (joints + 6)");
-  py::array_t<double> result({count, n - 6});
-  const double* const of = jacobian.data();
-  const double* const from = change.data();
-  double* const to = result.mutable_data();
-  const py::gil_scoped_release released;
   Eigen::MatrixXd now(12, n);
   Eigen::VectorXd torque(n - 6), wrench(12);
-  for (py::ssize_t i = 0; i < count; ++i) {
-    now = Eigen::Map<const RowMajor>(of + 12 * n * i, 12, n);
-    wrench = Eigen::Map<const Eigen::VectorXd>(from + 12 * i, 12);
-    balance::RedistributionTorque(now, wrench, torque);
-    Eigen::Map<Eigen::VectorXd>(to + (n - 6) * i, n - 6) = torque;
-  }
-  return result;
+  return EachRow({{jacobian, "contact_jacobian", {12, n}}, {change, "wrench_change", {12}}},
+                 {n - 6}, [&](Row from, double* to) {
+                   now = Eigen::Map<const RowMajor>(from[0], 12, n);
+                   wrench = Eigen::Map<const Eigen::VectorXd>(from[1], 12);
+                   balance::RedistributionTorque(now, wrench, torque);
+                   return Put(torque, to);
+                 });
 }
 
 /// x, y (m, frame O) and ω (rad/s), a column each; NaN where there is none.
 py::array_t<double> Capture(const Array& frame, const Array& com, const Array& velocity,
                             const Array& momentum, double gravity) {
-  const py::ssize_t count = CountOf(frame);
-  CheckShape(frame, "frame", count, {4, 4});
-  CheckShape(com, "com", count, {3});
-  CheckShape(velocity, "com_velocity", count, {3});
-  CheckShape(momentum, "angular_momentum", count, {3});
-  py::array_t<double> result({count, py::ssize_t{3}});
-  const double* const frames = frame.data();
-  const double* const coms = com.data();
-  const double* const velocities = velocity.data();
-  const double* const momenta = momentum.data();
-  double* const to = result.mutable_data();
-  const py::gil_scoped_release released;
-  for (py::ssize_t i = 0; i < count; ++i) {
-    const auto at = [&](const double* from) {
-      return Eigen::Vector3d(from[3 * i], from[3 * i + 1], from[3 * i + 2]);
-    };
-    balance::CapturePoint point;
-    const bool good = balance::ComputeCapturePoint(PoseAt(frames + 16 * i), at(coms),
-                                                   at(velocities), at(momenta), gravity, &point);
-    to[3 * i] = good ? point.position.x() : kNan;
-    to[3 * i + 1] = good ? point.position.y() : kNan;
-    to[3 * i + 2] = good ? point.frequency : kNan;
-  }
-  return result;
+  return EachRow({{frame, "frame", {4, 4}},
+                  {com, "com", {3}},
+                  {velocity, "com_velocity", {3}},
+                  {momentum, "angular_momentum", {3}}},
+                 {3}, [&](Row from, double* to) {
+                   const auto at = [&](size_t k) { return Eigen::Vector3d(from[k]); };
+                   balance::CapturePoint point;
+                   const bool good = balance::ComputeCapturePoint(PoseAt(from[0]), at(1), at(2),
+                                                                  at(3), gravity, &point);
+                   *Put(point.position, to) = point.frequency;
+                   return good;
+                 });
 }
 
 /// nearest x, y, and the signed distance, a column each.
 py::array_t<double> Nearest(const Array& corners, const Array& points) {
-  const ConvexPolygon polygon = PolygonOf(corners);
-  const py::ssize_t count = CountOf(points);
-  CheckShape(points, "points", count, {2});
-  py::array_t<double> result({count, py::ssize_t{3}});
-  const double* const from = points.data();
-  double* const to = result.mutable_data();
-  const py::gil_scoped_release released;
-  for (py::ssize_t i = 0; i < count; ++i) {
-    const Eigen::Vector2d point(from[2 * i], from[2 * i + 1]);
-    const bool good = point.allFinite();
-    const Eigen::Vector2d nearest =
-        good ? balance::NearestPoint(polygon, point) : Eigen::Vector2d::Constant(kNan).eval();
-    to[3 * i] = nearest.x();
-    to[3 * i + 1] = nearest.y();
-    to[3 * i + 2] = good ? balance::SignedDistance(polygon, point) : kNan;
-  }
-  return result;
+  return EachRow(
+      {{points, "points", {2}}}, {3}, [polygon = PolygonOf(corners)](Row from, double* to) {
+        const Eigen::Vector2d point(from[0]);
+        if (!point.allFinite()) return false;
+        *Put(balance::NearestPoint(polygon, point), to) = balance::SignedDistance(polygon, point);
+        return true;
+      });
 }
 
 py::array_t<double> Support(const RobotHandle& robot, const Array& frame, const Array& soles,
@@ -272,99 +186,73 @@ py::array_t<double> Support(const RobotHandle& robot, const Array& frame, const 
   return ArrayOf(balance::SupportPolygon(PoseAt(frame.data()), geometry, polygons));
 }
 
+void CheckAnyContact(const Feet& in_contact) {
+  if (in_contact[0] || in_contact[1]) return;
+  throw py::value_error("in_contact: a foot must be in contact");
+}
+
 /// (24) of task rows J, J̇ q̇ and the wanted acceleration; NaN where the tasks cannot be.
 py::array_t<double> TaskTorqueOf(const RobotHandle& robot, const StateArrays& states,
                                  const Feet& in_contact, const Array& jacobian, const Array& bias,
                                  const Array& wanted) {
-  const py::ssize_t count = states.Check(robot.model());
   const py::ssize_t k = robot.model().num_joints();
   const py::ssize_t rows = jacobian.ndim() == 3 ? jacobian.shape(1) : 0;
-  CheckShape(jacobian, "jacobian", count, {rows, k + 6});
-  CheckShape(bias, "bias_acceleration", count, {rows});
-  CheckShape(wanted, "acceleration", count, {rows});
+  CheckShape(jacobian, "jacobian", states.Check(robot.model()), {rows, k + 6});
   if (rows < 1 || rows > k) throw py::value_error("jacobian: must have 1 to num_joints rows");
-  if (!in_contact[0] && !in_contact[1]) {
-    throw py::value_error("in_contact: a foot must be in contact");
-  }
-  py::array_t<double> result({count, k});
-  const double* const jacobians = jacobian.data();
-  const double* const biases = bias.data();
-  const double* const accelerations = wanted.data();
-  double* const to = result.mutable_data();
-  const StatePointers pointers = states.Pointers();
-  const py::gil_scoped_release released;
+  CheckAnyContact(in_contact);
   balance::WholeBody body(robot.shared());
   balance::TaskDynamics task(static_cast<int>(k), static_cast<int>(rows));
-  robot::RobotState state(robot.model().num_joints());
   Eigen::MatrixXd rows_now(rows, k + 6);
   Eigen::VectorXd bias_now(rows), wanted_now(rows), torque(k);
-  for (py::ssize_t i = 0; i < count; ++i) {
-    rows_now = Eigen::Map<const RowMajor>(jacobians + i * rows * (k + 6), rows, k + 6);
-    bias_now = Eigen::Map<const Eigen::VectorXd>(biases + i * rows, rows);
-    wanted_now = Eigen::Map<const Eigen::VectorXd>(accelerations + i * rows, rows);
-    if (pointers.Read(i, &state) && body.Update(state, in_contact) &&
-        task.Compute(body.contact(), rows_now, bias_now)) {
-      task.TaskTorque(wanted_now, torque);
-    } else {
-      torque.setConstant(kNan);
-    }
-    Eigen::Map<Eigen::VectorXd>(to + i * k, k) = torque;
-  }
-  return result;
+  return EachState(
+      robot.model(), states,
+      {{jacobian, "jacobian", {rows, k + 6}},
+       {bias, "bias_acceleration", {rows}},
+       {wanted, "acceleration", {rows}}},
+      {k}, [&](const robot::RobotState& state, Row from, double* to) {
+        rows_now = Eigen::Map<const RowMajor>(from[0], rows, k + 6);
+        bias_now = Eigen::Map<const Eigen::VectorXd>(from[1], rows);
+        wanted_now = Eigen::Map<const Eigen::VectorXd>(from[2], rows);
+        if (!body.Update(state, in_contact) || !task.Compute(body.contact(), rows_now, bias_now)) {
+          return false;
+        }
+        task.TaskTorque(wanted_now, torque);
+        Put(torque, to);
+        return true;
+      });
 }
 
-/// (39)–(46): the torque, then the centres of pressure before and after and whether it balanced.
-py::tuple Balance(const RobotHandle& robot, const StateArrays& states, const Feet& in_contact,
-                  const Array& torque, const Array& region, bool legs_only) {
-  const py::ssize_t count = states.Check(robot.model());
+/// (39)–(46): the torque, the centres of pressure before and after, and 1 where it balanced, else
+/// 0.
+py::array_t<double> Balance(const RobotHandle& robot, const StateArrays& states,
+                            const Feet& in_contact, const Array& torque, const Array& region,
+                            bool legs_only) {
   const py::ssize_t k = robot.model().num_joints();
-  CheckShape(torque, "torque", count, {k});
   const ConvexPolygon polygon = PolygonOf(region);
-  if (!in_contact[0] && !in_contact[1]) {
-    throw py::value_error("in_contact: a foot must be in contact");
-  }
-  py::array_t<double> result({count, k});
-  py::array_t<double> cop({count, py::ssize_t{2}, py::ssize_t{2}});
-  py::array_t<bool> active(count);
-  const double* const from = torque.data();
-  double* const to = result.mutable_data();
-  double* const cops = cop.mutable_data();
-  bool* const actives = active.mutable_data();
-  const StatePointers pointers = states.Pointers();
-  {
-    const py::gil_scoped_release released;
-    balance::WholeBody body(robot.shared());
-    balance::TaskDynamics height(static_cast<int>(k), 1);
-    balance::BalanceControl control(static_cast<int>(k), 1);
-    robot::RobotState state(robot.model().num_joints());
-    Eigen::VectorXd now(k);
-    Eigen::MatrixXd row(1, k + 6);
-    Eigen::VectorXd bias(1);
-    for (py::ssize_t i = 0; i < count; ++i) {
-      now = Eigen::Map<const Eigen::VectorXd>(from + i * k, k);
-      balance::BalanceResult balanced;
-      bool good = pointers.Read(i, &state) && body.Update(state, in_contact);
-      if (good) {
-        row = body.data().com_jacobian.bottomRows(1);
-        bias[0] = body.data().com_bias_acceleration.z();
-        good =
-            height.Compute(body.contact(), row, bias) &&
-            control.Compute(body.contact(), height, body.geometry(), polygon, true, now, &balanced,
-                            legs_only ? balance::Movers::kLegs : balance::Movers::kAllJoints) ==
-                balance::BalanceStatus::kOk;
-      }
-      if (!good) {
-        now.setConstant(kNan);
-        balanced.cop_task.setConstant(kNan);
-        balanced.cop.setConstant(kNan);
-      }
-      Eigen::Map<Eigen::VectorXd>(to + i * k, k) = now;
-      Eigen::Map<Eigen::Vector2d>(cops + 4 * i) = balanced.cop_task;
-      Eigen::Map<Eigen::Vector2d>(cops + 4 * i + 2) = balanced.cop;
-      actives[i] = good && (balanced.active_x || balanced.active_y);
-    }
-  }
-  return py::make_tuple(result, cop, active);
+  CheckAnyContact(in_contact);
+  balance::WholeBody body(robot.shared());
+  balance::TaskDynamics height(static_cast<int>(k), 1);
+  balance::BalanceControl control(static_cast<int>(k), 1);
+  Eigen::VectorXd now(k);
+  Eigen::MatrixXd row(1, k + 6);
+  Eigen::VectorXd bias(1);
+  const auto movers = legs_only ? balance::Movers::kLegs : balance::Movers::kAllJoints;
+  return EachState(robot.model(), states, {{torque, "torque", {k}}}, {k + 5},
+                   [&](const robot::RobotState& state, Row from, double* to) {
+                     now = Eigen::Map<const Eigen::VectorXd>(from[0], k);
+                     if (!body.Update(state, in_contact)) return false;
+                     row = body.data().com_jacobian.bottomRows(1);
+                     bias[0] = body.data().com_bias_acceleration.z();
+                     balance::BalanceResult balanced;
+                     if (!height.Compute(body.contact(), row, bias) ||
+                         control.Compute(body.contact(), height, body.geometry(), polygon, true,
+                                         now, &balanced, movers) != balance::BalanceStatus::kOk) {
+                       return false;
+                     }
+                     to = Put(balanced.cop, Put(balanced.cop_task, Put(now, to)));
+                     *to = balanced.active_x || balanced.active_y ? 1 : 0;
+                     return true;
+                   });
 }
 
 }  // namespace

@@ -23,155 +23,107 @@ using robot::RobotModel;
 /// What a state's evaluation needs.
 enum class Needs { kFeet, kDynamics, kContacts, kTorque };
 
+/// What a quantity is computed from.
+struct Now {
+  const WholeBody& body;
+  const robot::RobotState& state;
+  const Eigen::VectorXd& torque;
+};
+
+// Sizes that depend on the robot and its contacts: joints, velocities, rows of the contacts.
+constexpr py::ssize_t kJoints = -1, kVelocities = -2, kContactRows = -3;
+
 struct Quantity {
   const char* name;
   Needs needs;
-  /// Shape for k joints, m contact rows.
-  std::vector<py::ssize_t> (*shape)(py::ssize_t k, py::ssize_t m);
-  /// Writes the numbers in C order.
-  void (*write)(const WholeBody& body, const robot::RobotState& state,
-                const Eigen::Ref<const Eigen::VectorXd>& torque, double* to);
+  Shape shape;
+  double* (*write)(const Now& now, double* to);  ///< as Put
 };
 
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-double* Put(const Eigen::Ref<const Eigen::MatrixXd>& matrix, double* to) {
-  Eigen::Map<RowMajor>(to, matrix.rows(), matrix.cols()) = matrix;
-  return to + matrix.size();
+template <auto kMember>
+double* OfData(const Now& now, double* to) {
+  return Put(now.body.data().*kMember, to);
+}
+template <auto kGetter>
+double* OfContact(const Now& now, double* to) {
+  return Put((now.body.contact().*kGetter)(), to);
 }
 
-using Shape = std::vector<py::ssize_t>;
-using State = const robot::RobotState&;
-using Torque = const Eigen::Ref<const Eigen::VectorXd>&;
+/// Writes a part of the momentum whose linear one is the mass times `linear`, and whose angular one
+/// are the rows (or, where `bias`, their bias) of the angular momentum about the COM.
+double* PutMomentum(const Now& now, const Eigen::Ref<const Eigen::MatrixXd>& linear, bool bias,
+                    double* to) {
+  Eigen::MatrixXd rows(3, now.body.model().num_velocities());
+  Eigen::Vector3d bias_of_rows;
+  balance::ComputeAngularMomentumRows(now.body.data(), rows, &bias_of_rows);
+  to = Put(now.body.data().total_mass * linear, to);
+  return bias ? Put(bias_of_rows, to) : Put(rows, to);
+}
 
 const std::vector<Quantity>& Quantities() {
+  using balance::ContactDynamics;
+  constexpr auto k = kJoints, n = kVelocities, m = kContactRows;
   static const std::vector<Quantity> all = {
-      {"foot_pose", Needs::kFeet,
-       [](auto, auto) {
-         return Shape{2, 4, 4};
-       },
-       [](const WholeBody& body, State, Torque, double* to) {
-         for (const Eigen::Isometry3d& pose : body.data().foot_pose) to = Put(pose.matrix(), to);
+      {"foot_pose", Needs::kFeet, {2, 4, 4}, OfData<&RobotData::foot_pose>},
+      {"foot_jacobian", Needs::kFeet, {2, 6, n}, OfData<&RobotData::foot_jacobian>},
+      {"foot_velocity", Needs::kFeet, {2, 6}, OfData<&RobotData::foot_velocity>},
+      {"foot_bias_acceleration", Needs::kFeet, {2, 6}, OfData<&RobotData::foot_bias_acceleration>},
+      {"mass_matrix", Needs::kDynamics, {n, n}, OfData<&RobotData::mass_matrix>},
+      {"bias", Needs::kDynamics, {n}, OfData<&RobotData::bias>},
+      {"gravity", Needs::kDynamics, {n}, OfData<&RobotData::gravity>},
+      {"com", Needs::kDynamics, {3}, OfData<&RobotData::com>},
+      {"com_velocity", Needs::kDynamics, {3}, OfData<&RobotData::com_velocity>},
+      {"com_jacobian", Needs::kDynamics, {3, n}, OfData<&RobotData::com_jacobian>},
+      {"com_bias_acceleration", Needs::kDynamics, {3}, OfData<&RobotData::com_bias_acceleration>},
+      {"momentum",
+       Needs::kDynamics,
+       {6},
+       [](const Now& now, double* to) {
+         to = Put(now.body.data().total_mass * now.body.data().com_velocity, to);
+         return Put(balance::AngularMomentum(now.state, now.body.data()), to);
        }},
-      {"foot_jacobian", Needs::kFeet,
-       [](auto k, auto) {
-         return Shape{2, 6, k + 6};
-       },
-       [](const WholeBody& body, State, Torque, double* to) {
-         for (const auto& jacobian : body.data().foot_jacobian) to = Put(jacobian, to);
+      {"momentum_matrix",
+       Needs::kDynamics,
+       {6, n},
+       [](const Now& now, double* to) {
+         return PutMomentum(now, now.body.data().com_jacobian, /*bias=*/false, to);
        }},
-      {"foot_velocity", Needs::kFeet,
-       [](auto, auto) {
-         return Shape{2, 6};
-       },
-       [](const WholeBody& body, State, Torque, double* to) {
-         for (const auto& velocity : body.data().foot_velocity) to = Put(velocity, to);
+      {"momentum_bias",
+       Needs::kDynamics,
+       {6},
+       [](const Now& now, double* to) {
+         return PutMomentum(now, now.body.data().com_bias_acceleration, /*bias=*/true, to);
        }},
-      {"foot_bias_acceleration", Needs::kFeet,
-       [](auto, auto) {
-         return Shape{2, 6};
-       },
-       [](const WholeBody& body, State, Torque, double* to) {
-         for (const auto& bias : body.data().foot_bias_acceleration) to = Put(bias, to);
+      {"contact_jacobian", Needs::kContacts, {m, n}, OfContact<&ContactDynamics::contact_jacobian>},
+      {"lambda_c", Needs::kContacts, {m, m}, OfContact<&ContactDynamics::lambda_c>},
+      {"mu_c", Needs::kContacts, {m}, OfContact<&ContactDynamics::mu_c>},
+      {"p_c", Needs::kContacts, {m}, OfContact<&ContactDynamics::p_c>},
+      {"jc_bar_transpose", Needs::kContacts, {m, n}, OfContact<&ContactDynamics::jc_bar_transpose>},
+      {"w", Needs::kContacts, {k, k}, OfContact<&ContactDynamics::w>},
+      {"w_pinv", Needs::kContacts, {k, k}, OfContact<&ContactDynamics::w_pinv>},
+      {"gravity_torque",
+       Needs::kContacts,
+       {k},
+       [](const Now& now, double* to) {
+         Eigen::VectorXd torque(now.body.model().num_joints());
+         balance::GravityCompensation(now.body.contact(), torque);
+         return Put(torque, to);
        }},
-      {"mass_matrix", Needs::kDynamics,
-       [](auto k, auto) {
-         return Shape{k + 6, k + 6};
-       },
-       [](const WholeBody& body, State, Torque, double* to) { Put(body.data().mass_matrix, to); }},
-      {"bias", Needs::kDynamics, [](auto k, auto) { return Shape{k + 6}; },
-       [](const WholeBody& body, State, Torque, double* to) { Put(body.data().bias, to); }},
-      {"gravity", Needs::kDynamics, [](auto k, auto) { return Shape{k + 6}; },
-       [](const WholeBody& body, State, Torque, double* to) { Put(body.data().gravity, to); }},
-      {"com", Needs::kDynamics, [](auto, auto) { return Shape{3}; },
-       [](const WholeBody& body, State, Torque, double* to) { Put(body.data().com, to); }},
-      {"com_velocity", Needs::kDynamics, [](auto, auto) { return Shape{3}; },
-       [](const WholeBody& body, State, Torque, double* to) { Put(body.data().com_velocity, to); }},
-      {"com_jacobian", Needs::kDynamics,
-       [](auto k, auto) {
-         return Shape{3, k + 6};
-       },
-       [](const WholeBody& body, State, Torque, double* to) { Put(body.data().com_jacobian, to); }},
-      {"com_bias_acceleration", Needs::kDynamics, [](auto, auto) { return Shape{3}; },
-       [](const WholeBody& body, State, Torque, double* to) {
-         Put(body.data().com_bias_acceleration, to);
+      {"wrench",
+       Needs::kTorque,
+       {m},
+       [](const Now& now, double* to) {
+         Eigen::VectorXd wrench(now.body.contact().num_contact_rows());
+         now.body.contact().ExpectedWrench(now.torque, wrench);
+         return Put(wrench, to);
        }},
-      {"momentum", Needs::kDynamics, [](auto, auto) { return Shape{6}; },
-       [](const WholeBody& body, State state, Torque, double* to) {
-         to = Put(body.data().total_mass * body.data().com_velocity, to);
-         Put(balance::AngularMomentum(state, body.data()), to);
-       }},
-      {"momentum_matrix", Needs::kDynamics,
-       [](auto k, auto) {
-         return Shape{6, k + 6};
-       },
-       [](const WholeBody& body, State, Torque, double* to) {
-         to = Put(body.data().total_mass * body.data().com_jacobian, to);
-         Eigen::MatrixXd rows(3, body.model().num_velocities());
-         Eigen::Vector3d bias;
-         balance::ComputeAngularMomentumRows(body.data(), rows, &bias);
-         Put(rows, to);
-       }},
-      {"momentum_bias", Needs::kDynamics, [](auto, auto) { return Shape{6}; },
-       [](const WholeBody& body, State, Torque, double* to) {
-         to = Put(body.data().total_mass * body.data().com_bias_acceleration, to);
-         Eigen::MatrixXd rows(3, body.model().num_velocities());
-         Eigen::Vector3d bias;
-         balance::ComputeAngularMomentumRows(body.data(), rows, &bias);
-         Put(bias, to);
-       }},
-      {"contact_jacobian", Needs::kContacts,
-       [](auto k, auto m) {
-         return Shape{m, k + 6};
-       },
-       [](const WholeBody& body, State, Torque, double* to) {
-         Put(body.contact().contact_jacobian(), to);
-       }},
-      {"lambda_c", Needs::kContacts,
-       [](auto, auto m) {
-         return Shape{m, m};
-       },
-       [](const WholeBody& body, State, Torque, double* to) {
-         Put(body.contact().lambda_c(), to);
-       }},
-      {"mu_c", Needs::kContacts, [](auto, auto m) { return Shape{m}; },
-       [](const WholeBody& body, State, Torque, double* to) { Put(body.contact().mu_c(), to); }},
-      {"p_c", Needs::kContacts, [](auto, auto m) { return Shape{m}; },
-       [](const WholeBody& body, State, Torque, double* to) { Put(body.contact().p_c(), to); }},
-      {"jc_bar_transpose", Needs::kContacts,
-       [](auto k, auto m) {
-         return Shape{m, k + 6};
-       },
-       [](const WholeBody& body, State, Torque, double* to) {
-         Put(body.contact().jc_bar_transpose(), to);
-       }},
-      {"w", Needs::kContacts,
-       [](auto k, auto) {
-         return Shape{k, k};
-       },
-       [](const WholeBody& body, State, Torque, double* to) { Put(body.contact().w(), to); }},
-      {"w_pinv", Needs::kContacts,
-       [](auto k, auto) {
-         return Shape{k, k};
-       },
-       [](const WholeBody& body, State, Torque, double* to) { Put(body.contact().w_pinv(), to); }},
-      {"gravity_torque", Needs::kContacts, [](auto k, auto) { return Shape{k}; },
-       [](const WholeBody& body, State, Torque, double* to) {
-         Eigen::VectorXd torque(body.model().num_joints());
-         balance::GravityCompensation(body.contact(), torque);
-         Put(torque, to);
-       }},
-      {"wrench", Needs::kTorque, [](auto, auto m) { return Shape{m}; },
-       [](const WholeBody& body, State, Torque torque, double* to) {
-         Eigen::VectorXd wrench(body.contact().num_contact_rows());
-         body.contact().ExpectedWrench(torque, wrench);
-         Put(wrench, to);
-       }},
-      {"acceleration", Needs::kTorque, [](auto k, auto) { return Shape{k + 6}; },
-       [](const WholeBody& body, State, Torque torque, double* to) {
-         Eigen::VectorXd acceleration(body.model().num_velocities());
-         body.contact().Acceleration(torque, acceleration);
-         Put(acceleration, to);
+      {"acceleration",
+       Needs::kTorque,
+       {n},
+       [](const Now& now, double* to) {
+         Eigen::VectorXd acceleration(now.body.model().num_velocities());
+         now.body.contact().Acceleration(now.torque, acceleration);
+         return Put(acceleration, to);
        }},
   };
   return all;
@@ -202,9 +154,11 @@ py::dict Evaluate(const RobotHandle& robot, const std::vector<std::string>& name
       throw py::value_error(fmt::format("{}: needs torque", name));
     }
     most = std::max(most, found->needs);
-    std::vector<py::ssize_t> shape = found->shape(k, m);
-    py::ssize_t size = 1;
-    for (const py::ssize_t n : shape) size *= n;
+    Shape shape = found->shape;
+    for (py::ssize_t& size : shape) {
+      size = size == kJoints ? k : size == kVelocities ? k + 6 : size == kContactRows ? m : size;
+    }
+    const py::ssize_t size = SizeOf(shape);
     shape.insert(shape.begin(), count);
     py::array_t<double> array(shape);
     wanted.push_back({&*found, array.mutable_data(), size});
@@ -214,13 +168,12 @@ py::dict Evaluate(const RobotHandle& robot, const std::vector<std::string>& name
     throw py::value_error("in_contact: a foot must be in contact");
   }
   const double* const torques = torque ? torque->data() : nullptr;
-  const StatePointers pointers = states.Pointers();
   const py::gil_scoped_release released;
   WholeBody body(robot.shared());
   robot::RobotState state(robot.model().num_joints());
   Eigen::VectorXd now = Eigen::VectorXd::Zero(k);
   for (py::ssize_t i = 0; i < count; ++i) {
-    bool good = pointers.Read(i, &state);
+    bool good = states.Read(i, &state);
     if (torques != nullptr) now = Eigen::Map<const Eigen::VectorXd>(torques + i * k, k);
     if (good && most >= Needs::kContacts) {
       good = body.Update(state, in_contact);
@@ -232,7 +185,7 @@ py::dict Evaluate(const RobotHandle& robot, const std::vector<std::string>& name
     for (const Wanted& each : wanted) {
       double* const to = each.to + i * each.size;
       if (good) {
-        each.quantity->write(body, state, now, to);
+        each.quantity->write({body, state, now}, to);
       } else {
         std::fill_n(to, each.size, std::numeric_limits<double>::quiet_NaN());
       }
@@ -241,82 +194,53 @@ py::dict Evaluate(const RobotHandle& robot, const std::vector<std::string>& name
   return results;
 }
 
+const robot::Frame& FrameNamed(const RobotHandle& robot, const std::string& name) {
+  const robot::Frame* const found = robot.model().FindFrame(name);
+  if (found == nullptr) throw ConfigError(fmt::format("the robot has no link '{}'", name));
+  return *found;
+}
+
 py::array_t<double> PointJacobian(const RobotHandle& robot, const StateArrays& states,
-                                  const std::string& frame, const std::array<double, 3>& point) {
-  const py::ssize_t count = states.Check(robot.model());
-  const robot::Frame* const found = robot.model().FindFrame(frame);
-  if (found == nullptr) throw ConfigError(fmt::format("the robot has no link '{}'", frame));
-  const py::ssize_t n = robot.model().num_velocities();
-  py::array_t<double> result({count, py::ssize_t{6}, n});
-  double* const to = result.mutable_data();
-  const StatePointers pointers = states.Pointers();
-  const py::gil_scoped_release released;
+                                  const std::string& name, const std::array<double, 3>& point) {
+  const robot::Frame& frame = FrameNamed(robot, name);
   RobotData data(robot.model());
-  robot::RobotState state(robot.model().num_joints());
-  robot::Matrix6X jacobian(6, n);
-  const Eigen::Vector3d at = found->pose * Eigen::Vector3d(point[0], point[1], point[2]);
-  for (py::ssize_t i = 0; i < count; ++i) {
-    if (pointers.Read(i, &state)) {
-      robot::ComputeKinematics(robot.model(), state, &data);
-      robot::ComputePointJacobian(robot.model(), data, found->body, at, jacobian);
-    } else {
-      jacobian.setConstant(std::numeric_limits<double>::quiet_NaN());
-    }
-    Put(jacobian, to + i * 6 * n);
-  }
-  return result;
+  robot::Matrix6X jacobian(6, robot.model().num_velocities());
+  const Eigen::Vector3d at = frame.pose * Eigen::Vector3d(point.data());
+  return EachState(robot.model(), states, {}, {6, jacobian.cols()},
+                   [&](const robot::RobotState& state, Row, double* to) {
+                     robot::ComputeKinematics(robot.model(), state, &data);
+                     robot::ComputePointJacobian(robot.model(), data, frame.body, at, jacobian);
+                     return Put(jacobian, to);
+                   });
 }
 
 py::array_t<double> FramePose(const RobotHandle& robot, const StateArrays& states,
-                              const std::string& frame) {
-  const py::ssize_t count = states.Check(robot.model());
-  const robot::Frame* const found = robot.model().FindFrame(frame);
-  if (found == nullptr) throw ConfigError(fmt::format("the robot has no link '{}'", frame));
-  py::array_t<double> result({count, py::ssize_t{4}, py::ssize_t{4}});
-  double* const to = result.mutable_data();
-  const StatePointers pointers = states.Pointers();
-  const py::gil_scoped_release released;
+                              const std::string& name) {
+  const robot::Frame& frame = FrameNamed(robot, name);
   RobotData data(robot.model());
-  robot::RobotState state(robot.model().num_joints());
-  for (py::ssize_t i = 0; i < count; ++i) {
-    Eigen::Matrix4d pose = Eigen::Matrix4d::Constant(std::numeric_limits<double>::quiet_NaN());
-    if (pointers.Read(i, &state)) {
-      robot::ComputeKinematics(robot.model(), state, &data);
-      const auto b = static_cast<size_t>(found->body);
-      Eigen::Isometry3d body = Eigen::Isometry3d::Identity();
-      body.linear() = data.body_rotation[b];
-      body.translation() = data.base_position + data.body_position[b];
-      pose = (body * found->pose).matrix();
-    }
-    Put(pose, to + 16 * i);
-  }
-  return result;
+  return EachState(robot.model(), states, {}, {4, 4},
+                   [&](const robot::RobotState& state, Row, double* to) {
+                     robot::ComputeKinematics(robot.model(), state, &data);
+                     const auto b = static_cast<size_t>(frame.body);
+                     Eigen::Isometry3d body = Eigen::Isometry3d::Identity();
+                     body.linear() = data.body_rotation[b];
+                     body.translation() = data.base_position + data.body_position[b];
+                     return Put(body * frame.pose, to);
+                   });
 }
 
 py::array_t<double> InverseDynamicsOf(const RobotHandle& robot, const StateArrays& states,
                                       const Array& acceleration) {
-  const py::ssize_t count = states.Check(robot.model());
   const py::ssize_t n = robot.model().num_velocities();
-  CheckShape(acceleration, "acceleration", count, {n});
-  py::array_t<double> result({count, n});
-  double* const to = result.mutable_data();
-  const double* const from = acceleration.data();
-  const StatePointers pointers = states.Pointers();
-  const py::gil_scoped_release released;
   RobotData data(robot.model());
-  robot::RobotState state(robot.model().num_joints());
   Eigen::VectorXd force(n), wanted(n);
-  for (py::ssize_t i = 0; i < count; ++i) {
-    if (pointers.Read(i, &state)) {
-      wanted = Eigen::Map<const Eigen::VectorXd>(from + i * n, n);
-      robot::ComputeKinematics(robot.model(), state, &data);
-      robot::InverseDynamics(robot.model(), state, data, wanted, force);
-    } else {
-      force.setConstant(std::numeric_limits<double>::quiet_NaN());
-    }
-    Put(force, to + i * n);
-  }
-  return result;
+  return EachState(robot.model(), states, {{acceleration, "acceleration", {n}}}, {n},
+                   [&](const robot::RobotState& state, Row from, double* to) {
+                     wanted = Eigen::Map<const Eigen::VectorXd>(from[0], n);
+                     robot::ComputeKinematics(robot.model(), state, &data);
+                     robot::InverseDynamics(robot.model(), state, data, wanted, force);
+                     return Put(force, to);
+                   });
 }
 
 /// The robot standing on level ground in its stance, soles about the world's origin.
@@ -332,18 +256,26 @@ py::dict Stance(const RobotHandle& robot) {
   return result;
 }
 
-template <class Of>
-auto ByJoint(const RobotHandle& robot, const Of& of) {
-  py::array_t<double> array(robot.model().num_joints());
-  for (int j = 0; j < robot.model().num_joints(); ++j) {
-    array.mutable_at(j) = of(robot.model().joints()[static_cast<size_t>(j)]);
-  }
-  return array;
+/// A property of a robot: what `of` gives of each element of `list`, a getter of RobotModel.
+template <class List, class Of>
+auto Each(List list, Of of) {
+  return [list, of](const RobotHandle& robot) {
+    const auto& elements = (robot.model().*list)();
+    std::vector<std::decay_t<std::invoke_result_t<Of, decltype(*elements.begin())>>> all;
+    for (const auto& element : elements) all.push_back(std::invoke(of, element));
+    return all;
+  };
 }
 
 }  // namespace
 
 void BindRobot(py::module_* module) {
+  const auto name = [](const auto& element) { return element.name; };
+  const auto limit = [](double robot::Joint::*of) {
+    return [each = Each(&RobotModel::joints, of)](const RobotHandle& robot) {
+      return py::array_t<double>(py::cast(each(robot)));
+    };
+  };
   py::class_<RobotHandle>(*module, "Robot")
       .def_static("named",
                   [](const std::string& name) {
@@ -364,54 +296,16 @@ void BindRobot(py::module_* module) {
       .def_property_readonly("name", [](const RobotHandle& r) { return r.model().name(); })
       .def_property_readonly("total_mass",
                              [](const RobotHandle& r) { return r.model().total_mass(); })
-      .def_property_readonly("joint_names",
-                             [](const RobotHandle& r) {
-                               std::vector<std::string> names;
-                               for (const auto& joint : r.model().joints()) {
-                                 names.push_back(joint.name);
-                               }
-                               return names;
-                             })
-      .def_property_readonly("body_names",
-                             [](const RobotHandle& r) {
-                               std::vector<std::string> names;
-                               for (const auto& body : r.model().bodies()) {
-                                 names.push_back(body.name);
-                               }
-                               return names;
-                             })
-      .def_property_readonly("frame_names",
-                             [](const RobotHandle& r) {
-                               std::vector<std::string> names;
-                               for (const auto& frame : r.model().frames()) {
-                                 names.push_back(frame.name);
-                               }
-                               return names;
-                             })
-      .def_property_readonly("foot_names",
-                             [](const RobotHandle& r) {
-                               std::vector<std::string> names;
-                               for (const auto& foot : r.model().feet()) names.push_back(foot.name);
-                               return names;
-                             })
-      .def_property_readonly("sole_size",
-                             [](const RobotHandle& r) {
-                               std::vector<std::pair<double, double>> sizes;
-                               for (const auto& foot : r.model().feet())
-                                 sizes.emplace_back(foot.length, foot.width);
-                               return sizes;
-                             })
-      .def_property_readonly("joint_lower",
-                             [](const RobotHandle& r) {
-                               return ByJoint(r, [](const auto& joint) { return joint.lower; });
-                             })
-      .def_property_readonly("joint_upper",
-                             [](const RobotHandle& r) {
-                               return ByJoint(r, [](const auto& joint) { return joint.upper; });
-                             })
-      .def_property_readonly("joint_effort", [](const RobotHandle& r) {
-        return ByJoint(r, [](const auto& joint) { return joint.effort; });
-      });
+      .def_property_readonly("joint_names", Each(&RobotModel::joints, name))
+      .def_property_readonly("body_names", Each(&RobotModel::bodies, name))
+      .def_property_readonly("frame_names", Each(&RobotModel::frames, name))
+      .def_property_readonly("foot_names", Each(&RobotModel::feet, name))
+      .def_property_readonly(
+          "sole_size", Each(&RobotModel::feet,
+                            [](const auto& foot) { return std::pair(foot.length, foot.width); }))
+      .def_property_readonly("joint_lower", limit(&robot::Joint::lower))
+      .def_property_readonly("joint_upper", limit(&robot::Joint::upper))
+      .def_property_readonly("joint_effort", limit(&robot::Joint::effort));
   py::class_<StateArrays>(*module, "States")
       .def(py::init<Array, Array, Array, Array>(), py::arg("q"), py::arg("v"),
            py::arg("base_position"), py::arg("base_orientation"));

@@ -5,7 +5,6 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
-#include <initializer_list>
 #include <memory>
 #include <string>
 #include <vector>
@@ -20,9 +19,10 @@ namespace py = pybind11;
 /// Numbers in C order; anything that numpy can turn into it is taken.
 using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
+using Shape = std::vector<py::ssize_t>;
+
 /// Throws ValueError unless `array` is `count` × `shape`.
-void CheckShape(const Array& array, const char* name, py::ssize_t count,
-                std::initializer_list<py::ssize_t> shape);
+void CheckShape(const Array& array, const char* name, py::ssize_t count, const Shape& shape);
 
 /// An array of a leaf's kind, `rows` × the leaf's shape; rows < 0: the leaf's shape alone. Owns its
 /// memory, which is not set.

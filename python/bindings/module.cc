@@ -12,8 +12,7 @@
 
 namespace poise::python {
 
-void CheckShape(const Array& array, const char* name, py::ssize_t count,
-                std::initializer_list<py::ssize_t> shape) {
+void CheckShape(const Array& array, const char* name, py::ssize_t count, const Shape& shape) {
   bool right =
       array.ndim() == 1 + static_cast<py::ssize_t>(shape.size()) && array.shape(0) == count;
   std::string wanted = fmt::format("{}", count);
@@ -71,12 +70,6 @@ std::string UnitOfLeaf(std::string_view type, std::string_view path) {
   return std::string(unit);
 }
 
-namespace {
-
-std::vector<std::string> Names(const std::string& kind) { return ListNames(kind); }
-
-}  // namespace
-
 PYBIND11_MODULE(_poise, m) {
   m.doc() = "The C++ half of the module poise.";
   static const py::exception<std::runtime_error> error(m, "Error", PyExc_ValueError);
@@ -85,7 +78,8 @@ PYBIND11_MODULE(_poise, m) {
   py::register_exception<logging::LogError>(m, "LogError", error);
   m.def("version", [] { return VersionText("poise"); });
   m.attr("__version__") = PoiseVersion();
-  m.def("names", &Names, "names of the files of a kind: scenarios, robots, graphs, sweeps, drives");
+  m.def("names", &ListNames,
+        "names of the files of a kind: scenarios, robots, graphs, sweeps, drives");
   LoadModules();
   LoadDescriptions();
   Components();

@@ -152,10 +152,11 @@ class Robot:
         """
         states, arrays, lead = self._states(q, v, base_position, base_orientation,
                                             (torque, 1, (self.num_joints,), "torque"))
-        result, cop, active = _poise.balance(self._handle, states, feet(in_contact), arrays[0], np.asarray(region, dtype=float),
-                                             bool(legs_only))
-        cop = cop.reshape(lead + (2, 2))
-        return result.reshape(lead + (self.num_joints,)), cop[..., 0, :], cop[..., 1, :], active.reshape(lead)
+        columns = _poise.balance(self._handle, states, feet(in_contact), arrays[0], np.asarray(region, dtype=float),
+                                 bool(legs_only))
+        k = self.num_joints
+        columns = columns.reshape(lead + (k + 5,))
+        return columns[..., :k], columns[..., k:k + 2], columns[..., k + 2:k + 4], columns[..., k + 4] == 1
 
     def support_polygon(self, frame, soles, *, in_contact=(True, True), margin=0.0):
         """Corners × 2 (m, in `frame`, anticlockwise) of the hull of the soles in contact, less a margin (m) of each."""

@@ -107,16 +107,13 @@ void TickRing::AddLane(Lane lane, const std::vector<int32_t>& counts) {
 }
 
 void TickRing::AddDerivedLane(const RunSpec& spec) {
-  std::string robot, urdf;
-  for (const Resource& resource : spec.resource()) {
-    if (resource.name() == "robot") robot = resource.text();
-    if (resource.name() == "urdf") urdf = resource.text();
-  }
+  const std::string& robot = ResourceOf(spec, "robot").text();
   const bool taken = std::ranges::any_of(
       lanes_, [](const Lane& lane) { return lane.name == logging::kDerivedChannel; });
   if (robot.empty() || taken) return;
   try {
-    robot_ = std::make_shared<const robot::RobotModel>(robot::LoadRobotTexts(robot, urdf));
+    robot_ = std::make_shared<const robot::RobotModel>(
+        robot::LoadRobotTexts(robot, ResourceOf(spec, "urdf").text()));
   } catch (const robot::RobotError&) {
     return;
   }
