@@ -143,9 +143,7 @@ void RunStore::Index() {
 }
 
 void RunStore::AddDerived() {
-  const bool taken = std::ranges::any_of(
-      channels_, [](const auto& channel) { return channel->name == logging::kDerivedChannel; });
-  if (channels_.empty() || taken) return;
+  if (channels_.empty()) return;
   try {
     model_ = record_ ? record_->robot : robot::LoadRobotTexts(robot_, urdf_);
   } catch (const robot::RobotError&) {

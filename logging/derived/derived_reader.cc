@@ -24,7 +24,6 @@ DerivedReader::DerivedReader(LogReader* reader, const LogMessages& messages) : r
 
 void DerivedReader::Start(const RunSpec& spec, const robot::RobotModel& robot) {
   for (const Channel& channel : spec.graph().channel()) {
-    if (channel.name() == kDerivedChannel) return;
     if (channel.external()) continue;
     const MessageType& type = ChannelType(channel);
     const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());

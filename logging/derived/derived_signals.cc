@@ -305,6 +305,7 @@ DerivedSignals::DerivedSignals(const RunSpec& spec, const robot::RobotModel& rob
       counts_{robot.num_joints(), static_cast<int32_t>(robot.feet().size())} {
   bool fits = true;
   for (const Channel& channel : spec.graph().channel()) {
+    fits = fits && channel.name() != kDerivedChannel;
     if (!IsKept(spec, channel.name())) continue;
     const MessageType& type = ChannelType(channel);
     uint32_t bit = 1;

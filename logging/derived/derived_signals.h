@@ -21,7 +21,8 @@ class DerivedSignals {
   /// `robot` must outlive it.
   DerivedSignals(const RunSpec& spec, const robot::RobotModel& robot);
 
-  /// False: the run's channels, or their counts, do not fit the robot or tell none of the signals.
+  /// False: the run's channels, or their counts, do not fit the robot or tell none of the signals,
+  /// or one of them is called kDerivedChannel itself.
   bool any() const { return any_; }
   /// True when the run has the messages that the field of this path follows from.
   bool Tells(std::string_view path) const;

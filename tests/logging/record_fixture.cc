@@ -57,7 +57,8 @@ RunRecord RecordTest::Read() {
   std::vector<RawEvent> events = {RunInfoEvent(spec_)};
   for (size_t t = 0; t < kTicks; ++t) {
     const auto add = [&](const char* channel, const auto& message) {
-      if (!without_.contains(channel)) Add(channel, message, &events);
+      if (without_.contains(channel) || lost_.contains({channel, t})) return;
+      Add(channel, message, &events);
     };
     add("ROBOT_SENSORS", sensors_[t]);
     add("ROBOT_STATE", state_[t]);

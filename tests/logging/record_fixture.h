@@ -5,6 +5,7 @@
 
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "logging/run_record.h"
@@ -37,8 +38,9 @@ class RecordTest : public testing::Test {
   TemporaryFolder folder_;
   std::string path_ = folder_.path("run.lcm");
   RunSpec spec_ = MakeTestSpec();
-  std::set<std::string> without_;  ///< channels that have no messages
-  bool with_drives_ = false;       ///< the log has DRIVE_COMMAND
+  std::set<std::string> without_;                  ///< channels that have no messages
+  std::set<std::pair<std::string, size_t>> lost_;  ///< single messages, by channel and tick
+  bool with_drives_ = false;                       ///< the log has DRIVE_COMMAND
   std::vector<robot_sensors_t> sensors_;
   std::vector<robot_state_t> state_;
   std::vector<support_plan_t> plan_;

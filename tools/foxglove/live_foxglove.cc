@@ -24,10 +24,12 @@ LiveFoxglove::LiveFoxglove(int port, const std::vector<std::string>& origins,
                       "protobuf", protobuf_.file_descriptor_set(), false});
   }
   derived_topic_ = topics.size();
-  const char* const derived = MessageTraits<derived::signals_t>::kName;
-  topics.push_back({logging::kDerivedChannel, "protobuf",
-                    logging::ProtobufMessages::FullName(derived), "protobuf",
-                    protobuf_.file_descriptor_set(), false});
+  if (derived_.signals().any()) {
+    const char* const derived = MessageTraits<derived::signals_t>::kName;
+    topics.push_back({logging::kDerivedChannel, "protobuf",
+                      logging::ProtobufMessages::FullName(derived), "protobuf",
+                      protobuf_.file_descriptor_set(), false});
+  }
   server_ = std::make_unique<FoxgloveServer>(port, "poise " + run.spec.scenario(), topics, origins);
   scene_.Begin();
 }

@@ -107,13 +107,9 @@ void TickRing::AddLane(Lane lane, const std::vector<int32_t>& counts) {
 }
 
 void TickRing::AddDerivedLane(const RunSpec& spec) {
-  const std::string& robot = ResourceOf(spec, "robot").text();
-  const bool taken = std::ranges::any_of(
-      lanes_, [](const Lane& lane) { return lane.name == logging::kDerivedChannel; });
-  if (robot.empty() || taken) return;
   try {
     robot_ = std::make_shared<const robot::RobotModel>(
-        robot::LoadRobotTexts(robot, ResourceOf(spec, "urdf").text()));
+        robot::LoadRobotTexts(ResourceOf(spec, "robot").text(), ResourceOf(spec, "urdf").text()));
   } catch (const robot::RobotError&) {
     return;
   }

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <memory>
 #include <thread>
+#include <utility>
 
 #include "components/framework/build_info.h"
 #include "components/framework/configuration/configuration.h"
@@ -92,7 +93,9 @@ ScenarioRun::ScenarioRun(const std::string& scenario, RunSetup setup, const RunO
 
 RunSetup ScenarioRun::Prepare(RunSetup setup, bool in_process, bool warn) const {
   setup.spec.set_recorded(!in_process && options_.launch.log);
-  if (!in_process) setup.graph.reset();  // each process makes its own components
+  // Each process makes its own components, and so does an interactive run, as often as it goes
+  // back.
+  if (!in_process || (warn && options_.interactive)) setup.graph.reset();
   if (warn) {
     for (const std::string& text : setup.warnings) fmt::print(stderr, "warning: {}\n", text);
   }
@@ -113,7 +116,9 @@ RunOutcome ScenarioRun::RunPart(RunSetup* setup, const run_info_t& info, const f
   Progress progress(static_cast<double>(spec.num_ticks() - spec.lead_ticks()) * spec.tick_period(),
                     quiet, static_cast<double>(spec.lead_ticks()) * spec.tick_period());
   if (socket == nullptr) {
-    return RunInline(spec, std::move(*setup->graph), info, dir / "run.lcm", &progress, record);
+    std::optional<BoundGraph> graph = std::exchange(setup->graph, std::nullopt);
+    if (!graph) graph = ConfigureRun(setup->loaded, &setup->spec);  // after ForgetComponents
+    return RunInline(spec, std::move(*graph), info, dir / "run.lcm", &progress, record);
   }
   return Launcher(spec, *socket, dir, launch, &progress).Run();
 }
@@ -193,6 +198,11 @@ void ScenarioRun::PrintEnd(const logging::RunRecord& record, const RunResult& re
   // A matrix knows none of these changes: beside it this run would be another one.
   const std::string matrix = options_.changes == RunChanges{} ? scenario_ : "";
   fmt::print("{}", FormatNext(main_.loaded.scenario, summary.checks, result.dir, latest, matrix));
+}
+
+void ScenarioRun::ForgetComponents() {
+  main_.graph.reset();
+  if (reference_) reference_->graph.reset();
 }
 
 LogSizes ScenarioRun::log_sizes() const {

@@ -57,6 +57,9 @@ class ScenarioRun {
   /// go into `out`. Throws as Run does.
   RunOutcome RunOnly(const std::string& out);
 
+  /// Lets go of the components, which Run makes again: for one that waits among many.
+  void ForgetComponents();
+
   const RunSpec& spec() const { return main_.spec; }
   const std::string& name() const { return main_.spec.scenario(); }
   const Scenario& scenario() const { return main_.loaded.scenario; }

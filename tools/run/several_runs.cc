@@ -104,7 +104,9 @@ std::string UniqueName(const std::string& name, std::set<std::string>* taken) {
 bool RunSeveral(const std::vector<std::string>& names, const RunOptions& options,
                 const std::string& out) {
   std::vector<ScenarioRun> runs;
-  for (const std::string& name : ExpandScenarios(names)) runs.emplace_back(name, options);
+  for (const std::string& name : ExpandScenarios(names)) {
+    runs.emplace_back(name, options).ForgetComponents();
+  }
   LogSizes sizes;
   for (const ScenarioRun& run : runs) {
     const LogSizes own = run.log_sizes();

@@ -184,6 +184,38 @@ TEST_F(DerivedSignalsTest, TorquesAreTheNearestToTheTruthThatTheRunHas) {
   EXPECT_NEAR(Value("torque_share[3]"), 400 / limit, 1e-12);
 }
 
+TEST_F(DerivedSignalsTest, ALostMessageTakesAwayWhatFollowsFromItInItsTickAlone) {
+  SetLoads(300, 100);
+  for (size_t t = 0; t < kTicks; ++t) {
+    planner_[t].com_position[0] = 1e-3 * static_cast<double>(t);
+    truth_[t].joint_torque[3] = 10;
+    bridge_[t].applied_torque[3] = 8;  // which does not take the truth's place
+  }
+  const std::pair<const char*, size_t> lost[] = {
+      {"com_error[0]", 40}, {"cop_measured[1]", 60}, {"torque_share[3]", 70}};
+  std::vector<std::vector<double>> whole;
+  for (const auto& [field, tick] : lost) whole.push_back(Values(field));
+  lost_ = {{"PLANNER_STATUS", 40}, {"ROBOT_SENSORS", 60}, {"GROUND_TRUTH", 70}};
+  for (size_t i = 0; i < whole.size(); ++i) {
+    const auto& [field, tick] = lost[i];
+    const std::vector<double> values = Values(field);
+    ASSERT_EQ(values.size(), whole[i].size()) << field;
+    for (size_t t = 1; t < values.size(); ++t) {
+      EXPECT_EQ(std::isnan(values[t]), t == tick) << field << " at " << t;
+      if (t == tick) continue;
+      EXPECT_EQ(values[t], whole[i][t]) << field << " at " << t;
+    }
+  }
+}
+
+TEST_F(DerivedSignalsTest, AChannelThatIsCalledDerivedTakesTheirPlace) {
+  EXPECT_FALSE(Values("com_error[0]").empty());
+  spec_.mutable_graph()->mutable_channel(0)->set_name(kDerivedChannel);
+  const RunRecord run = Read();
+  EXPECT_FALSE(DerivedSignals(spec_, run.robot).any());
+  EXPECT_TRUE(Values("com_error[0]").empty());
+}
+
 TEST_F(DerivedSignalsTest, WhatACommandLeavesZeroIsNotKnown) {
   EXPECT_EQ(Value("share_commanded"), 0);
   EXPECT_EQ(Value("foot[0].load_computed"), 0);
