@@ -2,25 +2,12 @@
 
 #include <array>
 #include <bit>
+#include <boost/crc.hpp>
 #include <cstddef>
 #include <cstring>
 
 namespace poise::unitree {
 namespace {
-
-constexpr uint32_t kPolynomial = 0x04C11DB7;
-
-constexpr std::array<uint32_t, 256> MakeTable() {
-  std::array<uint32_t, 256> table{};
-  for (uint32_t i = 0; i < table.size(); ++i) {
-    uint32_t crc = i << 24;
-    for (int bit = 0; bit < 8; ++bit) crc = (crc << 1) ^ ((crc >> 31) != 0 ? kPolynomial : 0);
-    table[i] = crc;
-  }
-  return table;
-}
-
-constexpr std::array<uint32_t, 256> kTable = MakeTable();
 
 /// A message's words as it lies in memory, where each field is at a multiple of its size.
 template <class T>
@@ -47,13 +34,12 @@ static_assert(std::endian::native == std::endian::little,
 }  // namespace
 
 uint32_t Crc32(std::span<const uint32_t> words) {
-  uint32_t crc = 0xFFFFFFFF;
+  boost::crc_optimal<32, 0x04C11DB7, 0xFFFFFFFF, 0, false, false> crc;
   for (const uint32_t word : words) {
-    for (int shift = 24; shift >= 0; shift -= 8) {
-      crc = (crc << 8) ^ kTable[(crc >> 24) ^ ((word >> shift) & 0xFF)];
-    }
+    const uint32_t from_the_top = __builtin_bswap32(word);
+    crc.process_bytes(&from_the_top, sizeof from_the_top);
   }
-  return crc;
+  return crc.checksum();
 }
 
 uint32_t CrcOf(const LowCmd& command) {

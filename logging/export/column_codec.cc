@@ -1,5 +1,6 @@
 #include "logging/export/column_codec.h"
 
+#include <google/protobuf/stubs/strutil.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -81,29 +82,15 @@ std::vector<uint8_t> Planes(const std::vector<uint32_t>& values) {
   return bytes;
 }
 
-std::vector<uint8_t> Deflate(const std::vector<uint8_t>& bytes) {
+std::string Deflate(const std::vector<uint8_t>& bytes) {
   uLongf size = compressBound(bytes.size());
-  std::vector<uint8_t> packed(size);
-  if (compress2(packed.data(), &size, bytes.data(), bytes.size(), Z_DEFAULT_COMPRESSION) != Z_OK) {
+  std::string packed(size, '\0');
+  if (compress2(reinterpret_cast<Bytef*>(packed.data()), &size, bytes.data(), bytes.size(),
+                Z_DEFAULT_COMPRESSION) != Z_OK) {
     throw std::runtime_error("zlib cannot pack a column: out of memory?");
   }
   packed.resize(size);
   return packed;
-}
-
-std::string Base64(const std::vector<uint8_t>& bytes) {
-  constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    const size_t count = std::min<size_t>(3, bytes.size() - i);
-    uint32_t group = 0;
-    for (size_t k = 0; k < 3; ++k) group = group << 8 | (k < count ? bytes[i + k] : 0u);
-    for (size_t k = 0; k < 4; ++k) {
-      text += k <= count ? kDigits[group >> (18 - 6 * k) & 63u] : '=';
-    }
-  }
-  return text;
 }
 
 PackedColumn Pack(std::vector<uint32_t> best, double step) {
@@ -119,7 +106,7 @@ PackedColumn Pack(std::vector<uint32_t> best, double step) {
     best_cost = cost;
     column.order = order;
   }
-  column.data = Base64(Deflate(Planes(best)));
+  google::protobuf::Base64Escape(Deflate(Planes(best)), &column.data);
   return column;
 }
 

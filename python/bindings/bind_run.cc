@@ -192,7 +192,7 @@ void BindRun(py::module_* module) {
            [](const RunStore& run, const std::string& name, const std::string& path) {
              const StoredChannel& channel = ChannelOf(run, name);
              LeafOf(channel, path);
-             return UnitOfLeaf(channel.type->name, path);
+             return UnitOf(channel.type->name, path);
            })
       .def("element_names", &ElementNamesOf)
       .def("labels",

@@ -28,9 +28,6 @@ void CheckShape(const Array& array, const char* name, py::ssize_t count, const S
 /// memory, which is not set.
 py::array NewArray(const Leaf& leaf, py::ssize_t rows);
 
-/// The unit of "foot_wrench.force" in a message type; empty: none.
-std::string UnitOfLeaf(std::string_view type, std::string_view path);
-
 /// One message, by itself.
 struct Message {
   std::vector<uint8_t> bytes;

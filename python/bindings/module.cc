@@ -54,22 +54,6 @@ py::array NewArray(const Leaf& leaf, py::ssize_t rows) {
   return make(double{});
 }
 
-std::string UnitOfLeaf(std::string_view type, std::string_view path) {
-  std::string_view unit;
-  while (!path.empty()) {
-    const std::string_view name = path.substr(0, path.find('.'));
-    path.remove_prefix(std::min(name.size() + 1, path.size()));
-    const FieldInfo* found = nullptr;
-    for (const FieldInfo& field : FieldsOf(type)) {
-      if (field.name == name) found = &field;
-    }
-    if (found == nullptr) return {};
-    if (*found->unit != '\0' || path.empty()) unit = found->unit;
-    type = found->type;
-  }
-  return std::string(unit);
-}
-
 PYBIND11_MODULE(_poise, m) {
   m.doc() = "The C++ half of the module poise.";
   static const py::exception<std::runtime_error> error(m, "Error", PyExc_ValueError);

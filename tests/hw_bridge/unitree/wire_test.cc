@@ -2,7 +2,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <boost/crc.hpp>
 #include <cstddef>
 #include <cstring>
 #include <random>
@@ -27,15 +26,16 @@ static_assert(offsetof(LowState, tick) == 12 && offsetof(LowState, imu_state) ==
 static_assert(offsetof(LowState, motor_state) == 72 && offsetof(LowState, crc) == 2088);
 static_assert(offsetof(LowState, wireless_remote) == 2032);
 
-/// Boost's CRC of the words' bytes, the most significant first.
-uint32_t BoostCrc(const std::vector<uint32_t>& words) {
-  boost::crc_optimal<32, 0x04C11DB7, 0xFFFFFFFF, 0, false, false> crc;
+/// The sum as the makers' programs compute it, bit by bit (unitree_sdk2, low-level examples).
+uint32_t MakersCrc(const std::vector<uint32_t>& words) {
+  uint32_t crc = 0xFFFFFFFF;
   for (const uint32_t word : words) {
-    for (int shift = 24; shift >= 0; shift -= 8) {
-      crc.process_byte(static_cast<unsigned char>(word >> shift));
+    for (uint32_t bit = 1U << 31; bit != 0; bit >>= 1) {
+      crc = (crc << 1) ^ ((crc >> 31) != 0 ? 0x04C11DB7 : 0);
+      if ((word & bit) != 0) crc ^= 0x04C11DB7;
     }
   }
-  return crc.checksum();
+  return crc;
 }
 
 template <class T>
@@ -45,25 +45,21 @@ std::vector<uint32_t> WordsOf(const T& message) {
   return words;
 }
 
-TEST(UnitreeCrc, IsThatOfAnotherLibrary) {
+TEST(UnitreeCrc, IsThatOfTheMakersPrograms) {
   std::mt19937 random(3);
   for (const size_t size : {0, 1, 2, 250, 522}) {
     std::vector<uint32_t> words(size);
     for (uint32_t& word : words) word = static_cast<uint32_t>(random());
-    EXPECT_EQ(Crc32(words), BoostCrc(words)) << size;
+    EXPECT_EQ(Crc32(words), MakersCrc(words)) << size;
   }
 }
 
 // CRC-32/MPEG-2 of "123456789" is 0x0376E6E7 (catalogue of parametrised CRC algorithms); here of
-// its first eight bytes as two words, and then of the ninth by Boost.
+// its first eight bytes as two words, and then of the ninth bit by bit.
 TEST(UnitreeCrc, HasTheCataloguesParameters) {
-  boost::crc_optimal<32, 0x04C11DB7, 0xFFFFFFFF, 0, false, false> crc;
-  crc.process_bytes("123456789", 9);
-  EXPECT_EQ(crc.checksum(), 0x0376E6E7U);
-  crc.reset();
-  crc.process_bytes("12345678", 8);
-  const std::vector<uint32_t> words = {0x31323334, 0x35363738};
-  EXPECT_EQ(Crc32(words), crc.checksum());
+  uint32_t crc = Crc32(std::vector<uint32_t>{0x31323334, 0x35363738}) ^ uint32_t { '9' } << 24;
+  for (int bit = 0; bit < 8; ++bit) crc = (crc << 1) ^ ((crc >> 31) != 0 ? 0x04C11DB7 : 0);
+  EXPECT_EQ(crc, 0x0376E6E7U);
 }
 
 /// Fields of all bytes; what C fills up between them stays zero.
@@ -90,7 +86,7 @@ TEST(UnitreeCrc, IsOfTheMessageAsItLiesInMemory) {
   std::mt19937 random(4);
   for (int i = 0; i < 20; ++i) {
     const LowCmd command = AnyCommand(&random);
-    EXPECT_EQ(CrcOf(command), BoostCrc(WordsOf(command)));
+    EXPECT_EQ(CrcOf(command), MakersCrc(WordsOf(command)));
   }
   LowState state;
   std::memset(static_cast<void*>(&state), 0, sizeof state);
@@ -110,7 +106,7 @@ TEST(UnitreeCrc, IsOfTheMessageAsItLiesInMemory) {
   }
   state.wireless_remote[39] = 0xA5;
   state.reserve[0] = 11;
-  EXPECT_EQ(CrcOf(state), BoostCrc(WordsOf(state)));
+  EXPECT_EQ(CrcOf(state), MakersCrc(WordsOf(state)));
 }
 
 TEST(UnitreeCrc, DoesNotSumWhatLiesBetweenFields) {
