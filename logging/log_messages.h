@@ -29,6 +29,7 @@ class LogMessages {
   /// A path in a message of this channel, elements by their names.
   std::string Label(std::string_view channel, std::string_view path) const;
   LogReader& reader() { return reader_; }
+  const LogReader& reader() const { return reader_; }
 
   /// The type of the event's message; nullptr when it is not a message of its channel.
   const MessageType* TypeOf(const LogEvent& event) const;

@@ -52,6 +52,8 @@ class LogReader {
   int64_t skipped_bytes() const;
   const std::vector<LogDamage>& damage() const { return damage_; }
   uint64_t file_size() const { return size_; }
+  /// Whether the file is no longer what it was when the reader was made.
+  bool file_changed() const { return file_.changed(); }
   /// The file's bytes, which events' data are a part of; nullptr for an empty file.
   const uint8_t* bytes() const { return data_; }
 

@@ -40,6 +40,7 @@ PagedFile::PagedFile(const std::string& path) {
     throw LogError(fmt::format("{}: is not a file", path));
   }
   size_ = capacity_ = static_cast<uint64_t>(status.st_size);
+  modified_ = status.st_mtim;
   if (size_ == 0) return;
   void* const map = mmap(nullptr, capacity_, PROT_READ, MAP_PRIVATE, fd_, 0);
   if (map == MAP_FAILED) {
@@ -49,6 +50,12 @@ PagedFile::PagedFile(const std::string& path) {
     Fail(fmt::format("{}: cannot be read", path));
   }
   data_ = static_cast<uint8_t*>(map);
+}
+
+bool PagedFile::changed() const {
+  struct stat status {};
+  return fstat(fd_, &status) != 0 || static_cast<uint64_t>(status.st_size) != size_ ||
+         status.st_mtim.tv_sec != modified_.tv_sec || status.st_mtim.tv_nsec != modified_.tv_nsec;
 }
 
 std::unique_ptr<PagedFile> PagedFile::Scratch() {

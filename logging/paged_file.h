@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <ctime>
 #include <memory>
 #include <span>
 #include <string>
@@ -21,6 +22,8 @@ class PagedFile {
   PagedFile& operator=(const PagedFile&) = delete;
 
   uint64_t size() const { return size_; }
+  /// Whether somebody has written to the file that is read.
+  bool changed() const;
   /// All bytes, for who lets go of what it has looked at; nullptr without any.
   const uint8_t* data() const { return data_; }
   /// The bytes from `offset` on, below size(); they may be looked at until the next Append or
@@ -49,6 +52,7 @@ class PagedFile {
 
   static constexpr int kWindowBits = 19;  // 512 KiB
   int fd_ = -1;
+  timespec modified_{};  // as it was opened
   uint8_t* data_ = nullptr;
   uint64_t size_ = 0;      // bytes in use
   uint64_t capacity_ = 0;  // bytes mapped

@@ -1,14 +1,7 @@
 #include "python/run_store.h"
 
-#include <fcntl.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <map>
 #include <numeric>
 #include <set>
@@ -19,17 +12,12 @@
 #include "derived/message_traits.hpp"
 #include "fmt/format.h"
 #include "logging/derived/derived_signals.h"
-#include "logging/log_messages.h"
 
 namespace poise::python {
 
 using logging::LogError;
 
 namespace {
-
-int64_t ModifiedAt(const struct stat& info) {
-  return static_cast<int64_t>(info.st_mtim.tv_sec) * 1'000'000'000 + info.st_mtim.tv_nsec;
-}
 
 /// By ascending tick, the first of each.
 void SortByTick(StoredChannel* channel) {
@@ -52,47 +40,12 @@ void SortByTick(StoredChannel* channel) {
 
 }  // namespace
 
-RunStore::RunStore(const std::string& log) : log_(log) {
-  fd_ = open(log.c_str(), O_RDONLY | O_CLOEXEC);
-  struct stat info {};
-  if (fd_ < 0 || fstat(fd_, &info) != 0) {
-    const int why = errno;
-    if (fd_ >= 0) close(fd_);
-    throw LogError(fmt::format("{}: {}", log, std::strerror(why)));
-  }
-  size_ = static_cast<uint64_t>(info.st_size);
-  modified_ = ModifiedAt(info);
-  if (size_ > 0) {
-    void* const at = mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, fd_, 0);
-    if (at == MAP_FAILED) {
-      const int why = errno;
-      close(fd_);
-      throw LogError(fmt::format("{}: {}", log, std::strerror(why)));
-    }
-    bytes_ = static_cast<const uint8_t*>(at);
-  }
-  try {
-    Index();
-  } catch (...) {
-    if (bytes_ != nullptr) munmap(const_cast<uint8_t*>(bytes_), size_);
-    close(fd_);
-    throw;
-  }
-}
-
-RunStore::~RunStore() {
-  if (fd_ < 0) return;
-  if (bytes_ != nullptr) munmap(const_cast<uint8_t*>(bytes_), size_);
-  close(fd_);
-}
-
-void RunStore::Index() {
-  logging::LogMessages messages(log_);
-  spec_ = messages.spec();
-  scenario_ = messages.info().scenario;
-  robot_ = messages.info().robot;
-  urdf_ = messages.info().urdf;
-  names_ = messages.names();
+RunStore::RunStore(const std::string& log) : log_(log), messages_(std::in_place, log) {
+  spec_ = messages_->spec();
+  scenario_ = messages_->info().scenario;
+  robot_ = messages_->info().robot;
+  urdf_ = messages_->info().urdf;
+  names_ = messages_->names();
   struct Lane {
     StoredChannel* channel = nullptr;
     std::optional<PacketFilter> filter;
@@ -115,7 +68,8 @@ void RunStore::Index() {
                                     counts, spec_.run_id()),
                        channel.external()});
   }
-  logging::LogReader& reader = messages.reader();
+  logging::LogReader& reader = messages_->reader();
+  bytes_ = reader.bytes();
   logging::LogEvent event;
   while (reader.Next(&event)) {
     const auto found = lanes.find(event.channel);
@@ -125,9 +79,7 @@ void RunStore::Index() {
         PacketVerdict::kAccepted) {
       continue;
     }
-    // The offset is one of the reader's bytes, which are those of this object's mapping.
-    const auto offset = static_cast<uint64_t>(event.data.data() - reader.bytes());
-    if (offset + lane.channel->layout.size() > size_) continue;
+    const auto offset = static_cast<uint64_t>(event.data.data() - bytes_);
     lane.channel->ticks.push_back(
         lane.external ? static_cast<int64_t>(std::llround(static_cast<double>(event.utime) * 1e-6 /
                                                           spec_.tick_period()))
@@ -246,12 +198,7 @@ const StoredChannel* RunStore::Find(std::string_view name) const {
 }
 
 void RunStore::CheckUnchanged() const {
-  if (fd_ < 0) return;
-  struct stat info {};
-  if (fstat(fd_, &info) == 0 && static_cast<uint64_t>(info.st_size) == size_ &&
-      ModifiedAt(info) == modified_) {
-    return;
-  }
+  if (!messages_ || !messages_->reader().file_changed()) return;
   throw LogError(fmt::format("{}: has changed since it was opened; open the run again", log_));
 }
 

@@ -11,6 +11,7 @@
 #include "components/framework/graph.pb.h"
 #include "components/framework/ports.h"
 #include "logging/element_names.h"
+#include "logging/log_messages.h"
 #include "logging/paged_file.h"
 #include "logging/run_record.h"
 #include "python/message_layout.h"
@@ -38,7 +39,6 @@ class RunStore {
   explicit RunStore(const std::string& log);
   /// An empty one in memory, for Add. `spec` must hold the channels' counts.
   RunStore(const RunSpec& spec, std::string scenario);
-  ~RunStore();
   RunStore(const RunStore&) = delete;
   RunStore& operator=(const RunStore&) = delete;
 
@@ -72,12 +72,12 @@ class RunStore {
   std::mutex& record_mutex() const { return record_mutex_; }
 
  private:
-  void Index();
   /// Adds the channel of the derived signals, empty, where the run tells any.
   void AddDerived();
   void ComputeDerived() const;
 
   std::string log_;
+  std::optional<logging::LogMessages> messages_;  // of a log
   RunSpec spec_;
   std::string scenario_, robot_, urdf_;
   logging::ElementNames names_;
@@ -85,9 +85,6 @@ class RunStore {
   std::vector<StoredChannel*> of_graph_;  // by index in the graph; nullptr: not kept
   std::vector<uint8_t> memory_;
   const uint8_t* bytes_ = nullptr;
-  uint64_t size_ = 0;  // of the mapped file
-  int64_t modified_ = 0;
-  int fd_ = -1;
   int64_t damages_ = 0;
   std::optional<robot::RobotModel> model_;  // what signals are derived with
   StoredChannel* derived_ = nullptr;        // in channels_; nullptr: none

@@ -196,11 +196,7 @@ void BenchmarkSet::ReadController() {
   }
   const Graph merged = GraphFiles(FindFile("graphs", graph, graph_beside).string()).Merged();
   graph_text_ = TextOf(merged);
-  engine_ = subject_.engine;
-  for (const ComponentInstance& instance : merged.component()) {
-    const std::string& engine = Components().TraitsOf(TypeOf(instance)).engine;
-    if (engine_.empty()) engine_ = engine;
-  }
+  engine_ = subject_.engine.empty() ? EngineOf(merged) : subject_.engine;
   controller_.clear_graph();
   controller_.clear_name();
   controller_.clear_description();

@@ -42,11 +42,7 @@ struct WorldRun {
 };
 
 std::vector<std::string> Engines() {
-  std::vector<std::string> engines;
-  for (const auto& [type, entry] : Components().entries()) {
-    if (!entry.traits.engine.empty()) engines.push_back(entry.traits.engine);
-  }
-  std::sort(engines.begin(), engines.end());
+  std::vector<std::string> engines = EngineNames();
   // The paper's experiments were fitted in ODE: what it gives stands first.
   std::stable_partition(engines.begin(), engines.end(),
                         [](const std::string& engine) { return engine == "ode"; });

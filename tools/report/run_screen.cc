@@ -126,11 +126,7 @@ bool SameFile(const fs::path& a, const fs::path& b) {
 }  // namespace
 
 std::string FormatEngine(const Scenario& scenario, const Graph& graph) {
-  std::string engine;
-  for (const ComponentInstance& instance : graph.component()) {
-    const std::string& name = Components().TraitsOf(TypeOf(instance)).engine;
-    if (!name.empty()) engine = name;
-  }
+  const std::string engine = EngineOf(graph);
   const auto* section = Scenario::descriptor()->FindFieldByName(engine);
   if (engine.empty() || section == nullptr || section->is_repeated() ||
       section->cpp_type() != google::protobuf::FieldDescriptor::CPPTYPE_MESSAGE) {

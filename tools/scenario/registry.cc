@@ -1,8 +1,11 @@
 #include "tools/scenario/registry.h"
 
+#include <set>
+
 #include "components/contact_wrench_monitor/contact_wrench_monitor_type.h"
 #include "components/framework/configuration/added_fields.h"
 #include "components/framework/modules.h"
+#include "components/framework/run.h"
 #include "components/redistributor/redistributor_type.h"
 #include "components/state_estimator/state_estimator_type.h"
 #include "components/step_planner/step_planner_type.h"
@@ -33,6 +36,22 @@ const ComponentRegistry& Components() {
     return r;
   }();
   return registry;
+}
+
+std::vector<std::string> EngineNames() {
+  std::set<std::string> engines;
+  for (const auto& [type, entry] : Components().entries()) engines.insert(entry.traits.engine);
+  engines.erase("");
+  return {engines.begin(), engines.end()};
+}
+
+std::string EngineOf(const Graph& graph) {
+  std::string engine;
+  for (const ComponentInstance& instance : graph.component()) {
+    const std::string& of = Components().TraitsOf(TypeOf(instance)).engine;
+    if (!of.empty()) engine = of;
+  }
+  return engine;
 }
 
 }  // namespace poise

@@ -156,14 +156,12 @@ void ChooseEngine(const LoadedScenario& loaded, Graph* graph) {
   const std::string& engine = loaded.scenario.engine();
   if (!loaded.scenario.has_engine()) return;
   std::string chosen;
-  std::vector<std::string> engines;
   for (const auto& [type, entry] : Components().entries()) {
-    if (!entry.traits.engine.empty()) engines.push_back(entry.traits.engine);
     if (entry.traits.engine == engine) chosen = type;
   }
   if (engine.empty() || chosen.empty()) {
     FailField(loaded, "engine",
-              fmt::format("there is no engine '{}'; {}", engine, Suggest(engine, engines)));
+              fmt::format("there is no engine '{}'; {}", engine, Suggest(engine, EngineNames())));
   }
   bool found = false;
   for (ComponentInstance& instance : *graph->mutable_component()) {
@@ -204,11 +202,7 @@ void CheckDrivesOf(const RunChanges& changes, const LoadedScenario& loaded, cons
 
 /// Refuses what another engine than the run's is told: it would change nothing.
 void CheckEngineOf(const std::vector<std::string>& changes, const Graph& graph) {
-  std::string engine;
-  for (const ComponentInstance& instance : graph.component()) {
-    const std::string& name = Components().TraitsOf(TypeOf(instance)).engine;
-    if (!name.empty()) engine = name;
-  }
+  const std::string engine = EngineOf(graph);
   if (engine.empty()) return;
   for (const std::string& change : changes) {
     const std::string other = EngineOfField(change);
@@ -309,10 +303,8 @@ bool IsThere(const OptionalPort& port, const Scenario& scenario) {
 
 std::string EngineOfField(const std::string& field) {
   const std::string section = field.substr(0, field.find_first_of(".[="));
-  for (const auto& [type, entry] : Components().entries()) {
-    if (!section.empty() && entry.traits.engine == section) return section;
-  }
-  return "";
+  const std::vector<std::string> engines = EngineNames();
+  return std::ranges::find(engines, section) != engines.end() ? section : "";
 }
 
 RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes) {

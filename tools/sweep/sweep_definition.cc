@@ -35,10 +35,7 @@ constexpr char kMachineMetric[] = "real_time_factor";
 
 /// Throws ConfigError for what is no engine: a run would blame a change that nobody made.
 void CheckEngine(const std::string& engine) {
-  std::vector<std::string> engines;
-  for (const auto& [type, entry] : Components().entries()) {
-    if (!entry.traits.engine.empty()) engines.push_back(entry.traits.engine);
-  }
+  const std::vector<std::string> engines = EngineNames();
   if (std::ranges::find(engines, engine) != engines.end()) return;
   throw ConfigError(
       fmt::format("--world: there is no engine '{}'; {}", engine, Suggest(engine, engines)));
