@@ -59,6 +59,17 @@ test('conditions have a red limit, another scenario gets the general figures', (
   assert.ok(others.every((f) => !f.figure));
 });
 
+test('loads of feet without sensors are called observed', () => {
+  const labels = (run) => figuresFor(run).flatMap(({series}) => series).filter(({type, field}) => type === 'derived.signals_t' &&
+    /load_measured|ratio_measured|cop_measured/.test(field)).map(({label}) => label);
+  const sensed = labels(makeRun('7.2')), switchedOff = labels(makeRun('7.2', {}, 4, undefined, {sim: {foot_sensors: false}}));
+  const bare = makeRun('7.2');
+  bare.robot = {...bare.robot, feet: bare.robot.feet.map((foot) => ({...foot, force_sensor: false}))};
+  assert.ok(sensed.length >= 12 && sensed.every((label) => label.endsWith('measured')), `${sensed}`);
+  assert.deepEqual(switchedOff, sensed.map((label) => label.replace('measured', 'observed')));
+  assert.deepEqual(labels(bare), switchedOff);
+});
+
 test('a run without ground truth and push keeps the figures that it can show', () => {
   const run = makeRun('7.2', {}, 4, undefined, {}, ['ground_truth_t', 'external_push_t']);
   for (const name of [...run.signals.keys()]) if (/^DERIVED.*(true|push|_error)/.test(name)) run.signals.delete(name);

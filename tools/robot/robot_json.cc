@@ -62,6 +62,7 @@ Json RobotJson(const robot::RobotModel& model, const RobotDrawing& drawing) {
     json["feet"].push_back({{"name", foot.name},
                             {"body", foot.body},
                             {"sole", PoseJson(foot.sole)},
+                            {"force_sensor", foot.force_sensor},
                             {"corners", std::move(corners)}});
   }
   AddDrawing(drawing, &json);

@@ -31,13 +31,17 @@ function comMotion(run, figure, title, axes, note = '') {
 const push = (figure) => ({figure, title: 'External push, magnitude', unit: 'N',
   series: [derived('measured', 'measured', 'push_magnitude')]});
 
+/** What the feet's measured loads are called: without sensors in the feet the estimator observes them. */
+export const measuredName = ({robot, scenario}) =>
+  (scenario.sim?.foot_sensors === false || robot.feet.every(({force_sensor: sensor}) => sensor === false) ? 'observed' : 'measured');
+
 const UP_TO_LIMITS = {upToLimits: true, note: `Drawn up to ${LIMITS_SHOWN} times the limit.`};
 
-function resultantConditions(figure) {
+function resultantConditions(run, figure) {
   return [['a', 1, 'l_y/2 > |M_x| / |F_z|, resultant in frame O (37)'],
     ['b', 0, 'l_x/2 > |M_y| / |F_z|, resultant in frame O (38)']].map(([letter, i, title]) => ({
     figure: figure && `${figure}${letter}`, title, unit: 'm', ...UP_TO_LIMITS, series: [
-      derived('measured', 'measured', `cop_measured_abs[${i}]`),
+      derived(measuredName(run), 'measured', `cop_measured_abs[${i}]`),
       derived('computed', 'computed', `cop_computed_abs[${i}]`),
       series('limit', 'limit', 'balance_torque_t', `cop_limit[${i}]`)]}));
 }
@@ -47,7 +51,7 @@ function footConditions(run, figure, foot) {
   return CONDITIONS.map(({key, number, unit, limit, text}, i) => ({
     figure: figure && `${figure}${'abcd'[i]}`, unit, ...UP_TO_LIMITS,
     title: `${limit} > ${text}, ${name} foot (${number})`, series: [
-      derived('measured', 'measured', `foot[${foot}].ratio_measured.${key}`),
+      derived(measuredName(run), 'measured', `foot[${foot}].ratio_measured.${key}`),
       derived('computed', 'computed', `foot[${foot}].ratio_computed.${key}`),
       derived('limit', 'limit', `foot[${foot}].limit.${key}`)]}));
 }
@@ -110,7 +114,7 @@ const SECTIONS = {
     comMotion(run, '7', 'COM motion', ['x', 'y', 'z'], 'The paper sees 1 to 3 mm.')],
   '7.2': (run) => [
     comMotion(run, '9a', 'COM motion, lateral (y)', ['y'], `${SUPPORT_NOTE} The paper\'s largest: 35 mm.`), push('9b'),
-    ...resultantConditions('10'), ...footConditions(run, '11', 0), ...footConditions(run, '12', 1)],
+    ...resultantConditions(run, '10'), ...footConditions(run, '11', 0), ...footConditions(run, '12', 1)],
   '7.3': (run) => [
     comMotion(run, '14a', 'COM motion, lateral (y)', ['y'], `${SUPPORT_NOTE} The paper\'s largest: 10.6 mm.`),
     footMotion('14b', run, 1, 1, 'The paper\'s largest error: 15 mm.'), push('14c'),
@@ -122,15 +126,15 @@ const SECTIONS = {
     comMotion(run, '19a', 'COM motion, lateral (y)', ['y'], SUPPORT_NOTE), footMotion('19b', run, 1, 2),
     footMotion('20a', run, 1, 2, 'As 19b: zoom in on the contact.'),
     {figure: '20b', title: 'Vertical force on the left foot', unit: 'N', series: [
-      derived('measured', 'measured', 'foot[1].load_measured'),
+      derived(measuredName(run), 'measured', 'foot[1].load_measured'),
       derived('computed', 'computed', 'foot[1].load_computed')]},
     bodyRoll('21', 'a: first double support; b: second, with balancing.'),
-    ...resultantConditions('22'), ...footConditions(run, '23', 0), ...footConditions(run, '24', 1)],
+    ...resultantConditions(run, '22'), ...footConditions(run, '23', 0), ...footConditions(run, '24', 1)],
 };
 
 function defaults(run) {
   return [comMotion(run, '', 'COM motion, lateral (y)', ['y']), comMotion(run, '', 'COM motion', ['x', 'y', 'z']), push(''),
-    ...resultantConditions(''), ...run.robot.feet.flatMap((_, f) => footConditions(run, '', f))];
+    ...resultantConditions(run, ''), ...run.robot.feet.flatMap((_, f) => footConditions(run, '', f))];
 }
 
 /** Which torque torque_share is of: the nearest to the truth. */
@@ -151,7 +155,7 @@ function common(run, covered) {
   const eta = (label, role, field) => series(label, role, 'joint_command_t', field);
   return [
     {title: 'Vertical force of the ground on each foot', unit: 'N', series: ofFeet(run, (foot, f, what) =>
-      derived(`${foot.name}, ${what}`, `foot-${f}-${what}`, `foot[${f}].load_${what}`))},
+      derived(`${foot.name}, ${what === 'measured' ? measuredName(run) : what}`, `foot-${f}-${what}`, `foot[${f}].load_${what}`))},
     {title: 'η: the right foot\'s share of F_z (61)', unit: '', series: [
       eta('commanded', 'computed', 'eta'), eta('optimal (71)', 'desired', 'eta_optimal'),
       eta('lower bound', 'limit', 'eta_min'), eta('upper bound', 'limit', 'eta_max')]},

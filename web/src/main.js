@@ -4,7 +4,7 @@ import {Control, Hand} from './live/control.js';
 import {CONTROL_KEYS, controlPanel} from './live/control_panel.js';
 import {embeddedRuns} from './data.js';
 import {element, saveNamed} from './dom.js';
-import {changesOf, figuresFor} from './figures.js';
+import {changesOf, figuresFor, measuredName} from './figures.js';
 import {FOOTSTEPS} from './footsteps.js';
 import {grabbing} from './live/grab.js';
 import {linkButton} from './link.js';
@@ -107,7 +107,7 @@ function sceneKey(run, others) {
   };
   const key = element('details', {class: 'scene-key', open: WIDE.matches}, element('summary', {}, 'Signs in the picture'),
     element('ul', {class: 'key'}, entry('computed', '○↑', 'computed CoP, ground force'),
-      entry('measured', '●↑', 'measured'), entry('desired', '◇', 'O_d, while balancing'),
+      entry('measured', '●↑', measuredName(run)), entry('desired', '◇', 'O_d, while balancing'),
       entry('limit', '╌', 'acceptable region'), entry('support', '▭', 'soles, support polygon'),
       entry('capture', '●', `capture point; ─ last ${TRACE} s; ○ step needed`),
       entry('support', '▰', 'footprints, when they came down; ╌ planned'),

@@ -1,6 +1,6 @@
 // What holds at the time cursor, and the events.
 import {element} from './dom.js';
-import {DERIVED} from './figures.js';
+import {DERIVED, measuredName} from './figures.js';
 import {FOOTSTEPS} from './footsteps.js';
 import {formatNumber, quantity} from './units.js';
 
@@ -52,13 +52,13 @@ function rowsOf(run) {
     ['plan', [plan], plan && named(plan)], ['controller', [status], status && named(status)], ['bridge', [bridge], bridge && named(bridge)],
     ['η', [find('joint_command_t', 'eta')], ([v]) => formatNumber(v, DIGITS)],
     ['CoP computed x, y', ['cop[0]', 'cop[1]'].map((f) => find('balance_torque_t', f)), metres],
-    ['CoP measured x, y', derived('cop_measured[0]', 'cop_measured[1]'), metres],
+    [`CoP ${measuredName(run)} x, y`, derived('cop_measured[0]', 'cop_measured[1]'), metres],
     ['COM error x, y, z', derived('com_error[0]', 'com_error[1]', 'com_error[2]'), metres],
     ['push', derived('push_magnitude'), newton],
     ['step', step, (v) => (Number.isNaN(v[0]) ? '–' : v[0] > 0 ? `${feet[v[2]]}, ${step[0].valueNames[v[0]]}: ${step[1].valueNames[v[1]]}` : 'none')],
     ...stepRows(run),
     ...run.robot.feet.flatMap((foot, f) => ['measured', 'computed'].map((kind) =>
-      [`${foot.name} load, ${kind}`, derived(`foot[${f}].load_${kind}`), newton])),
+      [`${foot.name} load, ${kind === 'measured' ? measuredName(run) : kind}`, derived(`foot[${f}].load_${kind}`), newton])),
   ].filter(([, signals]) => signals.every(Boolean));
 }
 
