@@ -385,18 +385,15 @@ void ContactWrenchMonitor::UpdateCopError(const Eigen::Isometry3d& frame_o,
 
 void ContactWrenchMonitor::CutSoles(const Eigen::Vector2d& margin,
                                     FootArray<balance::ConvexPolygon>* soles) const {
-  constexpr const char* kField[] = {"sole_margin", "side_margin"};
-  for (int axis = 0; axis < 2; ++axis) {
-    for (const robot::FootModel& foot : model_->feet()) {
-      if (margin[axis] < robot::InnerRadius(foot)) continue;
-      throw ConfigError(kField[axis],
-                        fmt::format("is {} m and leaves nothing of the {} foot's "
-                                    "sole, {} x {} m",
-                                    margin[axis], foot.name, foot.length, foot.width));
-    }
-  }
+  const bool side = margin.y() > margin.x();
   for (const Foot f : kFeet) {
-    (*soles)[f] = balance::SolePolygon(model_->feet()[f], margin.x(), margin.y());
+    const robot::FootModel& foot = model_->feet()[f];
+    if (margin.maxCoeff() >= robot::InnerRadius(foot)) {
+      throw ConfigError(side ? "side_margin" : "sole_margin",
+                        fmt::format("is {} m and leaves nothing of the {} foot's sole, {} x {} m",
+                                    margin.maxCoeff(), foot.name, foot.length, foot.width));
+    }
+    (*soles)[f] = balance::SolePolygon(foot, margin.x(), margin.y());
   }
 }
 
