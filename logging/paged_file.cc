@@ -36,19 +36,13 @@ PagedFile::PagedFile(const std::string& path) {
   if (fd_ < 0) Fail(fmt::format("{}: cannot be read", path));
   struct stat status {};
   if (fstat(fd_, &status) != 0 || !S_ISREG(status.st_mode)) {
-    close(fd_);
     throw LogError(fmt::format("{}: is not a file", path));
   }
   size_ = capacity_ = static_cast<uint64_t>(status.st_size);
   modified_ = status.st_mtim;
   if (size_ == 0) return;
   void* const map = mmap(nullptr, capacity_, PROT_READ, MAP_PRIVATE, fd_, 0);
-  if (map == MAP_FAILED) {
-    const int problem = errno;
-    close(fd_);
-    errno = problem;
-    Fail(fmt::format("{}: cannot be read", path));
-  }
+  if (map == MAP_FAILED) Fail(fmt::format("{}: cannot be read", path));
   data_ = static_cast<uint8_t*>(map);
 }
 
@@ -71,7 +65,6 @@ std::unique_ptr<PagedFile> PagedFile::Scratch() {
 
 PagedFile::~PagedFile() {
   if (data_ != nullptr) munmap(data_, capacity_);
-  if (fd_ >= 0) close(fd_);
 }
 
 void PagedFile::Resize(uint64_t size) {

@@ -7,6 +7,8 @@
 #include <span>
 #include <string>
 
+#include "components/framework/file_descriptor.h"
+
 namespace poise::logging {
 
 /// A file's bytes, mapped. Only what was looked at last takes this process's memory: the rest goes
@@ -51,7 +53,7 @@ class PagedFile {
   void Move(uint64_t window);
 
   static constexpr int kWindowBits = 19;  // 512 KiB
-  int fd_ = -1;
+  FileDescriptor fd_;
   timespec modified_{};  // as it was opened
   uint8_t* data_ = nullptr;
   uint64_t size_ = 0;      // bytes in use

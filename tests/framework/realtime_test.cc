@@ -1,6 +1,5 @@
 // What real time changes: who waits for whom, and what is skipped.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -111,7 +110,7 @@ TEST(Inbox, AMessageThatCameAfterItsCycleIsLateInTheNext) {
 }
 
 TEST(StateStore, KeepsTheLatestAcrossMappings) {
-  const int fd = StateStore::MakeMemoryFile("state");
+  const FileDescriptor fd = StateStore::MakeMemoryFile("state");
   const std::string path = "/proc/self/fd/" + std::to_string(fd);
   StateStore writer(path);
   EXPECT_EQ(writer.tick(), -1);
@@ -125,7 +124,6 @@ TEST(StateStore, KeepsTheLatestAcrossMappings) {
   EXPECT_EQ(reader.tick(), 4);
   ASSERT_EQ(reader.latest().size(), 1u);
   EXPECT_EQ(reader.latest()[0], 14);
-  close(fd);
 }
 
 TEST(StateStore, RefusesAFileThatIsNone) {

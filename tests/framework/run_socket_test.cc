@@ -2,6 +2,7 @@
 #include "components/framework/bus/run_socket.h"
 
 #include <arpa/inet.h>
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
@@ -172,6 +173,25 @@ TEST_F(RunSocketTest, OnlyAStopIsTakenOfAll) {
   EXPECT_FALSE(only_stops(1, 1, 0));
   EXPECT_FALSE(only_stops(0, 0, 0));
   EXPECT_FALSE(only_stops(1, 0, 1));
+}
+
+TEST(FileDescriptor, IsClosedOnceWithItsLastOwner) {
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  const FileDescriptor reads = ends[0];
+  const auto open = [&] { return fcntl(ends[1], F_GETFD) >= 0; };
+  {
+    FileDescriptor none, first = ends[1];
+    EXPECT_LT(none, 0);
+    FileDescriptor second = std::move(first);
+    none = std::move(second);
+    EXPECT_TRUE(open());
+    EXPECT_EQ(none, ends[1]);
+    EXPECT_LT(second, 0);
+    errno = ENOENT;
+  }
+  EXPECT_EQ(errno, ENOENT);
+  EXPECT_FALSE(open());
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ ComponentProcess::ComponentProcess(std::string name, std::vector<std::string> co
   command_.insert(command_.end(), {"--socket", std::to_string(socket_)});
   if (restart_) {
     memory_fd_ = StateStore::MakeMemoryFile(name_);
-    const std::string path = fmt::format("/proc/{}/fd/{}", getpid(), memory_fd_);
+    const std::string path = fmt::format("/proc/{}/fd/{}", getpid(), int{memory_fd_});
     store_ = std::make_unique<StateStore>(path);
     command_.insert(command_.end(), {"--state", path});
   }
@@ -41,13 +41,7 @@ ComponentProcess::ComponentProcess(std::string name, std::vector<std::string> co
   if (restart_) StartSpare();
 }
 
-ComponentProcess::~ComponentProcess() {
-  if (pidfd_ >= 0) close(pidfd_);
-  if (memory_fd_ >= 0) close(memory_fd_);
-}
-
 void ComponentProcess::Watch() {
-  if (pidfd_ >= 0) close(pidfd_);
   // Without this descriptor (an old kernel) a death is only seen later.
   pidfd_ = static_cast<int>(syscall(SYS_pidfd_open, process_->pid(), 0));
 }

@@ -22,9 +22,6 @@ class ComponentProcess {
   /// `components`: those that it runs, empty: the one of its name. Throws std::system_error.
   ComponentProcess(std::string name, std::vector<std::string> command, std::string log_path,
                    bool restart, const RunSocket& socket, std::vector<std::string> components = {});
-  ~ComponentProcess();
-  ComponentProcess(const ComponentProcess&) = delete;
-  ComponentProcess& operator=(const ComponentProcess&) = delete;
 
   /// Looks after it: lets the successor take over when the process has died. False when it has
   /// ended for good: it is not to be restarted, it and its successors died more than 5 times within
@@ -58,10 +55,10 @@ class ComponentProcess {
   bool restart_;
   int socket_;
   std::vector<std::string> components_;
-  int memory_fd_ = -1;
+  FileDescriptor memory_fd_;
   std::unique_ptr<StateStore> store_;
   std::unique_ptr<ChildProcess> process_, spare_;
-  int pidfd_ = -1;
+  FileDescriptor pidfd_;
   int started_ = 0;  // processes so far
   int32_t takeovers_ = 0;
   std::deque<int64_t> deaths_;  // ns, of the last 2 s

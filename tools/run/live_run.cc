@@ -3,13 +3,13 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/file.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <chrono>
 #include <thread>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/file_descriptor.h"
 #include "components/framework/modules.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
@@ -71,11 +71,8 @@ RunSpec ReadLiveSpec(const fs::path& dir, std::string_view log_command) {
 }  // namespace
 
 bool RunInProgress(const fs::path& dir) {
-  const int fd = open(dir.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) return false;
-  const bool locked = flock(fd, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
-  close(fd);
-  return locked;
+  const FileDescriptor fd = open(dir.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  return fd >= 0 && flock(fd, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
 }
 
 LiveRun::LiveRun(const std::string& run, std::string_view log_command, std::string_view command)

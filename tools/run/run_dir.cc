@@ -83,16 +83,11 @@ RunDir::RunDir(fs::path path)
     : path_(std::move(path)), fd_(open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
   if (fd_ >= 0 && flock(fd_, LOCK_EX | LOCK_NB) == 0) return;
   const int problem = errno;
-  if (fd_ >= 0) close(fd_);
   throw ConfigError(fmt::format(
       "{}: {}", path_.string(),
       problem == EWOULDBLOCK
           ? "a run is going on in this folder; choose another with --out, or wait for its end"
           : fmt::format("cannot be locked: {}", std::strerror(problem))));
-}
-
-RunDir::~RunDir() {
-  if (fd_ >= 0) close(fd_);
 }
 
 RunDir MakeRunDir(const std::string& out, const std::string& name, bool force) {

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
-#include <utility>
 
+#include "components/framework/file_descriptor.h"
 #include "components/framework/graph.pb.h"
 #include "poise/run_info_t.hpp"
 
@@ -22,16 +22,12 @@ class RunDir {
  public:
   /// Throws ConfigError when another run goes on in `path`, a folder.
   explicit RunDir(std::filesystem::path path);
-  ~RunDir();
-  RunDir(RunDir&& other) noexcept
-      : path_(std::move(other.path_)), fd_(std::exchange(other.fd_, -1)) {}
-  RunDir& operator=(RunDir&&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
 
  private:
   std::filesystem::path path_;
-  int fd_ = -1;
+  FileDescriptor fd_;
 };
 
 /// Makes the run's folder: `out`, or, when empty, a new one under runs/ named after date and

@@ -35,22 +35,6 @@ constexpr double kMinute = 60;  // s
 constexpr double kDay = 24 * 60 * kMinute;
 constexpr size_t kLongestPath = 1 << 16;
 
-/// A file that is closed with this.
-class Fd {
- public:
-  explicit Fd(int fd) : fd_(fd) {}
-  ~Fd() {
-    if (fd_ >= 0) close(fd_);
-  }
-  Fd(const Fd&) = delete;
-  Fd& operator=(const Fd&) = delete;
-  int get() const { return fd_; }
-  int release() { return std::exchange(fd_, -1); }
-
- private:
-  int fd_;
-};
-
 fs::path SharedDir(uid_t user) { return fmt::format("/tmp/{}{}", kDirPrefix, user); }
 
 /// True for a folder, not a link, that belongs to `user`: nobody else has put it there.
@@ -109,10 +93,10 @@ void AddRuns(const fs::path& dir, uid_t user, std::vector<RunningRun>* runs) {
   for (const auto& entry : fs::directory_iterator(dir, error)) {
     const std::string name = entry.path().filename().string();
     if (!name.starts_with(kRunPrefix) && !name.starts_with(kNewPrefix)) continue;
-    const Fd fd(open(entry.path().c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+    const FileDescriptor fd(
+        open(entry.path().c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
     struct stat status {};
-    if (fd.get() < 0 || fstat(fd.get(), &status) != 0 || !S_ISREG(status.st_mode) ||
-        status.st_uid != user) {
+    if (fd < 0 || fstat(fd, &status) != 0 || !S_ISREG(status.st_mode) || status.st_uid != user) {
       continue;
     }
     if (name.starts_with(kNewPrefix)) {
@@ -120,12 +104,12 @@ void AddRuns(const fs::path& dir, uid_t user, std::vector<RunningRun>* runs) {
       if (user == geteuid() && AgeOf(status) > kMinute) unlink(entry.path().c_str());
       continue;
     }
-    if (!Held(fd.get())) {
+    if (!Held(fd)) {
       if (user == geteuid()) Retire(entry.path(), status);
       continue;
     }
     RunningRun run;
-    run.dir = ReadAll(fd.get());
+    run.dir = ReadAll(fd);
     run.user = UserName(user);
     run.own = user == geteuid();
     run.start = status.st_mtim.tv_sec;
@@ -182,16 +166,16 @@ RunRegistration::RunRegistration(const fs::path& run_dir) {
     if (!BelongsTo(registry, geteuid())) continue;
     // Locked before it has its name, so that nobody takes it for a run that has died.
     std::string file = (registry / kNewPrefix).string() + "XXXXXX";
-    Fd fd(mkostemp(file.data(), O_CLOEXEC));
-    if (fd.get() < 0) continue;
+    FileDescriptor fd(mkostemp(file.data(), O_CLOEXEC));
+    if (fd < 0) continue;
     const fs::path name =
         registry / fmt::format("{}{}-{}", kRunPrefix, getpid(), file.substr(file.size() - 6));
-    if (flock(fd.get(), LOCK_EX | LOCK_NB) != 0 || fchmod(fd.get(), 0644) != 0 ||
-        !WriteAll(fd.get(), dir.native()) || rename(file.c_str(), name.c_str()) != 0) {
+    if (flock(fd, LOCK_EX | LOCK_NB) != 0 || fchmod(fd, 0644) != 0 || !WriteAll(fd, dir.native()) ||
+        rename(file.c_str(), name.c_str()) != 0) {
       unlink(file.c_str());
       continue;
     }
-    entries_.push_back({name, fd.release()});
+    entries_.push_back({name, std::move(fd)});
   }
   if (entries_.empty()) {
     fmt::print(stderr,
@@ -206,7 +190,6 @@ RunRegistration::~RunRegistration() {
     futimens(entry.fd, nullptr);  // when it ended
     const fs::path ended = entry.file.parent_path() / kEnded;
     if (rename(entry.file.c_str(), ended.c_str()) != 0) unlink(entry.file.c_str());
-    close(entry.fd);
   }
 }
 
@@ -245,10 +228,11 @@ fs::path LatestEndedRun() {
     least = age;
   };
   for (const fs::path& dir : RegistryDirs()) {
-    const Fd fd(open((dir / kEnded).c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+    const FileDescriptor fd(
+        open((dir / kEnded).c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
     struct stat status {};
-    if (fd.get() < 0 || fstat(fd.get(), &status) != 0 || status.st_uid != geteuid()) continue;
-    take(ReadAll(fd.get()), AgeOf(status));
+    if (fd < 0 || fstat(fd, &status) != 0 || status.st_uid != geteuid()) continue;
+    take(ReadAll(fd), AgeOf(status));
   }
   if (!newest.empty()) return newest;
   const fs::path latest = fs::canonical(RunsDir() / "latest", error);

@@ -12,6 +12,8 @@
 #include <string_view>
 #include <vector>
 
+#include "components/framework/file_descriptor.h"
+
 namespace poise {
 
 /// Keeps a run registered for as long as this lives. A registry that cannot be written fails no
@@ -27,7 +29,7 @@ class RunRegistration {
  private:
   struct Entry {
     std::filesystem::path file;
-    int fd;
+    FileDescriptor fd;
   };
   std::vector<Entry> entries_;
 };

@@ -3,7 +3,6 @@
 #include <google/protobuf/message.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -19,6 +18,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_path.h"
 #include "components/framework/configuration/suggest.h"
+#include "components/framework/file_descriptor.h"
 #include "components/framework/optional_ports.h"
 #include "components/framework/run.h"
 #include "components/robot_files/robot_files.h"
@@ -280,15 +280,13 @@ void AddResource(RunSpec* spec, const std::string& name, const std::string& file
 
 bool PortsFree(int first, int count) {
   for (int port = first; port < first + count; ++port) {
-    const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    const FileDescriptor fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     if (fd < 0) return false;
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_port = htons(static_cast<uint16_t>(port));
     address.sin_addr.s_addr = htonl(INADDR_ANY);
-    const bool free = bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof(address)) == 0;
-    close(fd);
-    if (!free) return false;
+    if (bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof(address)) != 0) return false;
   }
   return true;
 }

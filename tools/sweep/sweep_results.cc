@@ -89,20 +89,13 @@ SweepResultsWriter::SweepResultsWriter(const fs::path& folder, const SweepHeader
       fd_(open(path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644)) {
   const auto size = static_cast<off_t>(found ? found->size : 0);
   if (fd_ < 0 || ftruncate(fd_, size) != 0 || lseek(fd_, size, SEEK_SET) != size) {
-    const int error = errno;
-    if (fd_ >= 0) close(fd_);
-    throw ConfigError(fmt::format("{}: cannot be written: {}", path_, std::strerror(error)));
+    throw ConfigError(fmt::format("{}: cannot be written: {}", path_, std::strerror(errno)));
   }
   if (found) return;
   Write(HeaderText(header));
-  const int dir = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (dir >= 0) {
-    fsync(dir);  // the file's name, too
-    close(dir);
-  }
+  const FileDescriptor dir = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  fsync(dir);  // the file's name, too
 }
-
-SweepResultsWriter::~SweepResultsWriter() { close(fd_); }
 
 void SweepResultsWriter::Append(const SweepRow& row) { Write(SweepRow::RowText(row)); }
 

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "components/framework/file_descriptor.h"
 #include "tools/sweep/sweep.pb.h"
 #include "tools/sweep/sweep_run.h"
 
@@ -50,9 +51,6 @@ class SweepResultsWriter {
   /// ConfigError.
   SweepResultsWriter(const std::filesystem::path& folder, const SweepHeader& header,
                      const std::optional<SweepResults>& found);
-  ~SweepResultsWriter();
-  SweepResultsWriter(const SweepResultsWriter&) = delete;
-  SweepResultsWriter& operator=(const SweepResultsWriter&) = delete;
 
   /// Throws std::runtime_error: the disk is full, say.
   void Append(const SweepRow& row);
@@ -61,7 +59,7 @@ class SweepResultsWriter {
   void Write(const std::string& line);
 
   std::string path_;
-  int fd_ = -1;
+  FileDescriptor fd_;
 };
 
 }  // namespace poise

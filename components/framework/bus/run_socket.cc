@@ -22,22 +22,6 @@ namespace {
 
 constexpr timeval kAskPatience{3, 0};
 
-/// Closes what a constructor has opened when it throws.
-class Fd {
- public:
-  explicit Fd(int fd) : fd_(fd) {}
-  Fd(const Fd&) = delete;
-  Fd& operator=(const Fd&) = delete;
-  ~Fd() {
-    if (fd_ >= 0) close(fd_);
-  }
-  int get() const { return fd_; }
-  int release() { return std::exchange(fd_, -1); }
-
- private:
-  int fd_;
-};
-
 /// Where a run's socket is asked for: an abstract name, which ends with its owner.
 struct DeskName {
   explicit DeskName(const RunSpec& spec) {
@@ -55,44 +39,44 @@ struct DeskName {
   throw BusError(fmt::format("port {}: {}: {}", SourcePort(spec), what, std::strerror(errno)));
 }
 
-int OpenSource(const RunSpec& spec) {
+FileDescriptor OpenSource(const RunSpec& spec) {
   CheckBusRoute(ServiceUrl(spec));
-  Fd fd(socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
-  if (fd.get() < 0) Throw(spec, "socket");
+  FileDescriptor fd(socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  if (fd < 0) Throw(spec, "socket");
   const auto ttl = static_cast<unsigned char>(spec.ttl());
-  if (setsockopt(fd.get(), IPPROTO_IP, IP_MULTICAST_TTL, &ttl, sizeof(ttl)) != 0)
+  if (setsockopt(fd, IPPROTO_IP, IP_MULTICAST_TTL, &ttl, sizeof(ttl)) != 0)
     Throw(spec, "IP_MULTICAST_TTL");
   // On all addresses, and not to be shared: who could have the port on another address could still
   // name ours as a packet's source.
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<uint16_t>(SourcePort(spec)));
-  if (bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
+  if (bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
     Throw(spec, "the run's source port cannot be had");
-  return fd.release();
+  return fd;
 }
 
 /// -1: the machine has no IPv6.
-int OpenGuard(const RunSpec& spec) {
-  Fd fd(socket(AF_INET6, SOCK_DGRAM | SOCK_CLOEXEC, 0));
-  if (fd.get() < 0) return -1;
+FileDescriptor OpenGuard(const RunSpec& spec) {
+  FileDescriptor fd(socket(AF_INET6, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  if (fd < 0) return -1;
   const int one = 1;
   sockaddr_in6 address{};
   address.sin6_family = AF_INET6;
   address.sin6_port = htons(static_cast<uint16_t>(SourcePort(spec)));
-  if (setsockopt(fd.get(), IPPROTO_IPV6, IPV6_V6ONLY, &one, sizeof(one)) != 0 ||
-      bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
+  if (setsockopt(fd, IPPROTO_IPV6, IPV6_V6ONLY, &one, sizeof(one)) != 0 ||
+      bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
     Throw(spec, "the run's source port of IPv6 cannot be had");
-  return fd.release();
+  return fd;
 }
 
-int OpenDesk(const RunSpec& spec) {
-  Fd fd(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
+FileDescriptor OpenDesk(const RunSpec& spec) {
+  FileDescriptor fd(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
   const DeskName name(spec);
   constexpr int kBacklog = 32;
-  if (fd.get() < 0 || bind(fd.get(), name.get(), name.size) != 0 || listen(fd.get(), kBacklog) != 0)
+  if (fd < 0 || bind(fd, name.get(), name.size) != 0 || listen(fd, kBacklog) != 0)
     Throw(spec, "the place where it is asked for cannot be had");
-  return fd.release();
+  return fd;
 }
 
 /// A message of one byte that carries `fd`, or room for one.
@@ -132,13 +116,13 @@ class Parcel {
 /// Gives `socket` to those of this user and of root who connect, until `desk` is shut down.
 void Answer(int desk, int socket) {
   while (true) {
-    const Fd asker(accept4(desk, nullptr, nullptr, SOCK_CLOEXEC));
-    if (asker.get() < 0 && errno != ECONNABORTED) return;
+    const FileDescriptor asker(accept4(desk, nullptr, nullptr, SOCK_CLOEXEC));
+    if (asker < 0 && errno != ECONNABORTED) return;
     ucred user{};
     socklen_t size = sizeof(user);
-    if (getsockopt(asker.get(), SOL_SOCKET, SO_PEERCRED, &user, &size) != 0) continue;
+    if (getsockopt(asker, SOL_SOCKET, SO_PEERCRED, &user, &size) != 0) continue;
     // A refused one sees the end of the connection.
-    if (user.uid == geteuid() || user.uid == 0) Parcel().Send(asker.get(), socket);
+    if (user.uid == geteuid() || user.uid == 0) Parcel().Send(asker, socket);
   }
 }
 
@@ -157,34 +141,30 @@ Origin OfOthers(const RunSpec& spec) {
   return {Origin::kOthers, static_cast<uint16_t>(SourcePort(spec))};
 }
 
-RunSocket::RunSocket(const RunSpec& spec, int fd) : fd_(fd) {
+RunSocket::RunSocket(const RunSpec& spec, FileDescriptor fd) : fd_(std::move(fd)) {
   sockaddr_in address{};
   socklen_t size = sizeof(address);
-  if (getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size) == 0 &&
+  if (getsockname(fd_, reinterpret_cast<sockaddr*>(&address), &size) == 0 &&
       address.sin_family == AF_INET && ntohs(address.sin_port) == SourcePort(spec)) {
     return;
   }
-  throw BusError(fmt::format("descriptor {} is not the socket of this run, which has port {}", fd,
-                             SourcePort(spec)));
-}
-
-RunSocket::~RunSocket() {
-  if (fd_ >= 0) close(fd_);
+  throw BusError(fmt::format("descriptor {} is not the socket of this run, which has port {}",
+                             this->fd(), SourcePort(spec)));
 }
 
 RunSocket RunSocket::Ask(const RunSpec& spec) {
-  const Fd desk(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
+  const FileDescriptor desk(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
   const DeskName name(spec);
-  setsockopt(desk.get(), SOL_SOCKET, SO_SNDTIMEO, &kAskPatience, sizeof(kAskPatience));
-  setsockopt(desk.get(), SOL_SOCKET, SO_RCVTIMEO, &kAskPatience, sizeof(kAskPatience));
-  if (desk.get() < 0 || connect(desk.get(), name.get(), name.size) != 0) {
+  setsockopt(desk, SOL_SOCKET, SO_SNDTIMEO, &kAskPatience, sizeof(kAskPatience));
+  setsockopt(desk, SOL_SOCKET, SO_RCVTIMEO, &kAskPatience, sizeof(kAskPatience));
+  if (desk < 0 || connect(desk, name.get(), name.size) != 0) {
     throw BusError(
         fmt::format("run {}: nobody gives out its socket (port {}): {}; has it ended? start one "
                     "with poise run",
                     spec.run_id(), SourcePort(spec), std::strerror(errno)));
   }
   errno = 0;
-  const int fd = Parcel().Receive(desk.get());
+  const int fd = Parcel().Receive(desk);
   if (fd >= 0) return {spec, fd};
   if (errno == EAGAIN) {
     throw BusError(fmt::format(
@@ -193,43 +173,32 @@ RunSocket RunSocket::Ask(const RunSpec& spec) {
   }
   ucred owner{};
   socklen_t size = sizeof(owner);
-  getsockopt(desk.get(), SOL_SOCKET, SO_PEERCRED, &owner, &size);
+  getsockopt(desk, SOL_SOCKET, SO_PEERCRED, &owner, &size);
   throw BusError(
       fmt::format("run {}: it is of user {} and takes messages from that user and root alone; "
                   "poise estop stops it all the same",
                   spec.run_id(), owner.uid));
 }
 
-RunSource::RunSource(const RunSpec& spec) : socket_(spec, OpenSource(spec)) {
-  Fd guard(OpenGuard(spec));
-  Fd desk(OpenDesk(spec));
+RunSource::RunSource(const RunSpec& spec)
+    : socket_(spec, OpenSource(spec)), guard_(OpenGuard(spec)), desk_(OpenDesk(spec)) {
   // Signals are for the program's other threads.
   sigset_t all, before;
   sigfillset(&all);
   pthread_sigmask(SIG_SETMASK, &all, &before);
   try {
-    thread_ = std::thread(Answer, desk.get(), socket_.fd());
+    thread_ = std::thread(Answer, int{desk_}, socket_.fd());
   } catch (...) {
     pthread_sigmask(SIG_SETMASK, &before, nullptr);
     throw;
   }
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
-  desk_ = desk.release();
-  guard_ = guard.release();
 }
-
-RunSource::RunSource(RunSource&& other) noexcept
-    : socket_(std::move(other.socket_)),
-      guard_(std::exchange(other.guard_, -1)),
-      desk_(std::exchange(other.desk_, -1)),
-      thread_(std::move(other.thread_)) {}
 
 RunSource::~RunSource() {
   if (desk_ < 0) return;  // moved from
   shutdown(desk_, SHUT_RDWR);
   thread_.join();
-  close(desk_);
-  if (guard_ >= 0) close(guard_);
 }
 
 RunSender::RunSender(const RunSocket& socket, const std::string& url) : fd_(socket.fd()) {

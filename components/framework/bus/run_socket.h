@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "components/framework/bus/udp_bus.h"
+#include "components/framework/file_descriptor.h"
 #include "components/framework/graph.pb.h"
 
 namespace poise {
@@ -26,18 +27,15 @@ class RunSocket {
  public:
   /// One that a parent process has handed on; it is closed with this. Throws BusError when it is
   /// not this run's.
-  RunSocket(const RunSpec& spec, int fd);
+  RunSocket(const RunSpec& spec, FileDescriptor fd);
   /// Asks whoever started the run, who gives it to the same user and to root. Waits up to 3 s.
   /// Throws BusError.
   static RunSocket Ask(const RunSpec& spec);
-  RunSocket(RunSocket&& other) noexcept : fd_(other.fd_) { other.fd_ = -1; }
-  RunSocket& operator=(RunSocket&&) = delete;
-  ~RunSocket();
 
   int fd() const { return fd_; }
 
  private:
-  int fd_;
+  FileDescriptor fd_;
 };
 
 /// Opens the socket of a run and hands it out, on a thread of its own, to those who ask. Who starts
@@ -46,7 +44,7 @@ class RunSource {
  public:
   /// Throws BusError: no multicast route, or somebody has the port; std::system_error.
   explicit RunSource(const RunSpec& spec);
-  RunSource(RunSource&& other) noexcept;
+  RunSource(RunSource&&) = default;
   RunSource& operator=(RunSource&&) = delete;
   ~RunSource();
 
@@ -54,8 +52,8 @@ class RunSource {
 
  private:
   RunSocket socket_;
-  int guard_ = -1;  // the port of IPv6: packets of IPv4 can be sent from there too
-  int desk_ = -1;   // where the socket is asked for
+  FileDescriptor guard_;  // the port of IPv6: packets of IPv4 can be sent from there too
+  FileDescriptor desk_;   // where the socket is asked for
   std::thread thread_;
 };
 

@@ -7,7 +7,6 @@
 #include <net/if.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <array>
 #include <cerrno>
@@ -73,17 +72,13 @@ BusEndpoint ParseBusUrl(const std::string& url) {
 // Asks the kernel: liblcm would send, and print lines of its own.
 void CheckBusRoute(const std::string& url) {
   const BusEndpoint endpoint = ParseBusUrl(url);
-  const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  const FileDescriptor fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(endpoint.port);
   address.sin_addr.s_addr = endpoint.group;
-  const bool routed =
-      fd >= 0 && connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
-  const int reason = errno;
-  if (fd >= 0) close(fd);
-  if (!routed)
-    throw BusError(fmt::format("{}: cannot send: {}: {}", url, std::strerror(reason), kAdvice));
+  if (fd < 0 || connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
+    throw BusError(fmt::format("{}: cannot send: {}: {}", url, std::strerror(errno), kAdvice));
 }
 
 std::string ToString(const PacketSource& source) {
@@ -107,10 +102,8 @@ bool BusSender::Send(const char* channel, const uint8_t* data, size_t size) {
 BusReceiver::BusReceiver(const std::string& url, Origin origin) : buffer_(kMaxDatagram) {
   const BusEndpoint endpoint = ParseBusUrl(url);
   const auto fail = [&](const char* what) {
-    const int reason = errno;
-    if (fd_ >= 0) close(fd_);
     throw BusError(
-        fmt::format("{}: cannot receive: {}: {}: {}", url, what, std::strerror(reason), kAdvice));
+        fmt::format("{}: cannot receive: {}: {}: {}", url, what, std::strerror(errno), kAdvice));
   };
   fd_ = socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (fd_ < 0) fail("socket");
@@ -135,8 +128,6 @@ BusReceiver::BusReceiver(const std::string& url, Origin origin) : buffer_(kMaxDa
   if (setsockopt(fd_, IPPROTO_IP, IP_ADD_MEMBERSHIP, &membership, sizeof(membership)) != 0)
     fail("joining the group");
 }
-
-BusReceiver::~BusReceiver() { close(fd_); }
 
 bool BusReceiver::Receive(Packet* packet) {
   // Bounded: a flood of noise must not keep the caller here.

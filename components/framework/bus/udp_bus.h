@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "components/framework/bus/packet_filter.h"
+#include "components/framework/file_descriptor.h"
 
 typedef struct _lcm_t lcm_t;
 
@@ -81,9 +82,6 @@ class BusReceiver {
  public:
   /// Throws BusError.
   explicit BusReceiver(const std::string& url, Origin origin = {});
-  ~BusReceiver();
-  BusReceiver(const BusReceiver&) = delete;
-  BusReceiver& operator=(const BusReceiver&) = delete;
 
   int fd() const { return fd_; }
 
@@ -100,7 +98,7 @@ class BusReceiver {
   int64_t malformed() const { return malformed_; }
 
  private:
-  int fd_ = -1;
+  FileDescriptor fd_;
   int64_t malformed_ = 0;
   std::vector<uint8_t> buffer_;
 };

@@ -25,7 +25,7 @@ struct StateStore::Layout {
 static_assert(std::atomic<int64_t>::is_always_lock_free);
 
 StateStore::StateStore(const std::string& path) {
-  const int fd = open(path.c_str(), O_RDWR | O_CLOEXEC);
+  const FileDescriptor fd = open(path.c_str(), O_RDWR | O_CLOEXEC);
   if (fd < 0) throw std::system_error(errno, std::generic_category(), path);
   void* memory = MAP_FAILED;
   if (lseek(fd, 0, SEEK_END) >= static_cast<off_t>(sizeof(Layout))) {
@@ -33,20 +33,16 @@ StateStore::StateStore(const std::string& path) {
   } else {
     errno = EINVAL;  // not one of MakeMemoryFile
   }
-  const int error = errno;
-  close(fd);
-  if (memory == MAP_FAILED) throw std::system_error(error, std::generic_category(), path);
+  if (memory == MAP_FAILED) throw std::system_error(errno, std::generic_category(), path);
   layout_ = static_cast<Layout*>(memory);
 }
 
 StateStore::~StateStore() { munmap(layout_, sizeof(Layout)); }
 
-int StateStore::MakeMemoryFile(const std::string& name) {
-  const int fd = memfd_create(name.c_str(), MFD_CLOEXEC);
+FileDescriptor StateStore::MakeMemoryFile(const std::string& name) {
+  FileDescriptor fd = memfd_create(name.c_str(), MFD_CLOEXEC);
   if (fd < 0 || ftruncate(fd, sizeof(Layout)) != 0) {
-    const int error = errno;
-    if (fd >= 0) close(fd);
-    throw std::system_error(error, std::generic_category(), "memory for the state of " + name);
+    throw std::system_error(errno, std::generic_category(), "memory for the state of " + name);
   }
   return fd;
 }

@@ -7,6 +7,8 @@
 #include <span>
 #include <string>
 
+#include "components/framework/file_descriptor.h"
+
 namespace poise {
 
 /// A mapped file that the launcher makes and the processes of one component share, one after the
@@ -22,9 +24,9 @@ class StateStore {
   StateStore(const StateStore&) = delete;
   StateStore& operator=(const StateStore&) = delete;
 
-  /// A file for a StateStore that lives in memory alone. Returns its descriptor, the caller's to
-  /// close; another process opens it as /proc/PID/fd/N. Throws std::system_error.
-  static int MakeMemoryFile(const std::string& name);
+  /// A file for a StateStore that lives in memory alone. Another process opens it as
+  /// /proc/PID/fd/N while the descriptor is kept. Throws std::system_error.
+  static FileDescriptor MakeMemoryFile(const std::string& name);
 
   /// Where the state after `tick` is to be written, kCapacity bytes; Commit makes it the latest.
   std::span<uint8_t> Next();

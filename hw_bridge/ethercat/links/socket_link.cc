@@ -7,7 +7,6 @@
 #include <poll.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -35,10 +34,6 @@ sockaddr_in Address(const UdpConfig& config) {
 }
 
 }  // namespace
-
-SocketLink::~SocketLink() {
-  if (socket_ >= 0) close(socket_);
-}
 
 int64_t SocketLink::Now() const { return NowNanoseconds(); }
 

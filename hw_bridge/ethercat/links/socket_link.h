@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "components/framework/file_descriptor.h"
 #include "hw_bridge/ethercat/links/frame.h"
 #include "hw_bridge/ethercat/links/link.h"
 #include "hw_bridge/ethercat/links/link.pb.h"
@@ -18,7 +19,6 @@ class SocketLink : public Link {
  public:
   enum class Side { kMaster, kSlaves };
 
-  ~SocketLink() override;
   int64_t Now() const override;
   /// Readable when a frame has come.
   int fd() const { return socket_; }
@@ -27,7 +27,7 @@ class SocketLink : public Link {
   /// Waits until the socket is readable or the deadline has passed.
   bool WaitReadable(int64_t deadline) const;
 
-  int socket_ = -1;
+  FileDescriptor socket_;
 };
 
 /// EtherCAT over UDP (ETG.1000.4, 5.2.3), IPv4. Needs no privileges.
