@@ -1,11 +1,10 @@
 #include <sys/prctl.h>
 
-#include <CLI/CLI.hpp>
 #include <csignal>
 
-#include "components/framework/build_info.h"
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/modules.h"
+#include "components/framework/runners/program_options.h"
 #include "components/framework/say_error.h"
 #include "fmt/format.h"
 #include "logging/recording/recorder.h"
@@ -27,27 +26,21 @@ int main(int argc, char** argv) {
   prctl(PR_SET_PDEATHSIG, SIGTERM);
   std::signal(SIGXFSZ, SIG_IGN);  // a file that grows too large is an error that is told
 
-  CLI::App app{"Records a Poise run as an LCM event log. Usually started by `poise run`.",
-               "recorder"};
-  app.set_version_flag("--version", poise::VersionText("recorder"));
   std::string run_file;
   std::string scenario_file;
   int socket_fd = -1;
   poise::logging::RecorderOptions options;
   options.stop = &stop_asked;
-  app.add_option("--run", run_file, "the run: protobuf text of poise.RunSpec")->required();
-  app.add_option("--log", options.log_path, "event log to write")->required();
-  app.add_option("--report", options.report_path, "counters at the end, as JSON");
-  app.add_option("--scenario", scenario_file, "scenario text to keep in the log");
-  app.add_option("--socket", socket_fd, "descriptor of the run's socket; default: it is asked for");
-  app.add_flag("--mirror,!--no-mirror", options.mirror, "send everything to the run's public URL");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    poise::SayError(fmt::format("recorder: {}; see recorder --help", error.what()));
-    return 2;
-  }
+  const std::optional<int> code = poise::ParseProgram(
+      argc, argv, "recorder",
+      "Records a Poise run as an LCM event log. Usually started by `poise run`.",
+      {{"--run", &run_file, "the run: protobuf text of poise.RunSpec", true},
+       {"--log", &options.log_path, "event log to write", true},
+       {"--report", &options.report_path, "counters at the end, as JSON"},
+       {"--scenario", &scenario_file, "scenario text to keep in the log"},
+       {"--socket", &socket_fd, "descriptor of the run's socket; default: it is asked for"},
+       {"--mirror,!--no-mirror", &options.mirror, "send everything to the run's public URL"}});
+  if (code) return *code;
   try {
     poise::LoadModules();  // their messages
     poise::RunSpec spec;

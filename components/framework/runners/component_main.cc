@@ -2,17 +2,16 @@
 
 #include <sys/prctl.h>
 
-#include <CLI/CLI.hpp>
 #include <csignal>
 #include <cstdio>
 #include <optional>
 
-#include "components/framework/build_info.h"
 #include "components/framework/bus/run_socket.h"
 #include "components/framework/component_description.h"
 #include "components/framework/modules.h"
 #include "components/framework/run.h"
 #include "components/framework/runners/process_runner.h"
+#include "components/framework/runners/program_options.h"
 #include "components/framework/say_error.h"
 #include "fmt/format.h"
 
@@ -46,31 +45,21 @@ struct Arguments {
   int socket = -1;
 };
 
-/// Adds the options that every process has.
-void AddOptions(CLI::App* app, Arguments* arguments) {
-  app->add_option("--run", arguments->run_file, "the run: protobuf text of poise.RunSpec")
-      ->required();
-  CLI::Option* const state_option = app->add_option(
-      "--state", arguments->state, "file that keeps the state for a process that takes over");
-  app->add_flag("--standby", arguments->standby,
-                "wait for SIGUSR2, then take the place of a process that died")
-      ->needs(state_option);
-  app->add_option("--socket", arguments->socket,
-                  "descriptor of the run's socket; default: it is asked for");
+/// The options that every process has, and `own`.
+std::vector<ProgramOption> OptionsOf(Arguments* arguments, const std::vector<ProgramOption>& own) {
+  std::vector<ProgramOption> options = {
+      {"--run", &arguments->run_file, "the run: protobuf text of poise.RunSpec", true},
+      {"--state", &arguments->state, "file that keeps the state for a process that takes over"},
+      {"--standby", &arguments->standby,
+       "wait for SIGUSR2, then take the place of a process that died", false, "--state"},
+      {"--socket", &arguments->socket, "descriptor of the run's socket; default: it is asked for"}};
+  options.insert(options.end(), own.begin(), own.end());
+  return options;
 }
 
 /// Runs the process that `find` names; returns the exit code.
 template <class Find>
-int RunProcess(CLI::App* app, int argc, char** argv, const Arguments& arguments,
-               const ComponentRegistry& registry, const Find& find) {
-  CatchSignals();
-  try {
-    app->parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app->exit(error);
-    SayError(fmt::format("{}: {}; see {} --help", app->get_name(), error.what(), app->get_name()));
-    return 2;
-  }
+int RunProcess(const Arguments& arguments, const ComponentRegistry& registry, const Find& find) {
   try {
     RunSpec spec;
     ReadTextProto(arguments.run_file, &spec);
@@ -120,41 +109,35 @@ std::string ProcessOfComponent(const RunSpec& spec, const std::string& name,
 }  // namespace
 
 int ComponentMain(int argc, char** argv, const ComponentType& of) {
-  CLI::App app{
-      fmt::format("One process of a Poise run: component {}. Usually started by `poise run`.",
-                  of.name),
-      of.name};
-  app.set_version_flag("--version", VersionText(of.name));
+  CatchSignals();
   Arguments arguments;
   arguments.name = of.name;
-  AddOptions(&app, &arguments);
-  app.add_option("--component", arguments.name, "name of this component in the run's graph")
-      ->capture_default_str();
-  app.add_flag_callback(
-         "--describe",
-         [&of] {
-           fmt::print("{}\n", DescriptionOf(of).dump(2));
-           throw CLI::Success();
-         },
-         "print ports, settings and properties as JSON, and do nothing else")
-      ->trigger_on_parse();
+  const std::optional<int> code = ParseProgram(
+      argc, argv, of.name,
+      fmt::format("One process of a Poise run: component {}. Usually started by `poise run`.",
+                  of.name),
+      OptionsOf(&arguments,
+                {{"--component", &arguments.name, "name of this component in the run's graph"},
+                 {"--describe", [&of] { fmt::print("{}\n", DescriptionOf(of).dump(2)); },
+                  "print ports, settings and properties as JSON, and do nothing else"}}));
+  if (code) return *code;
   ComponentRegistry registry;
   registry.Add(of);
-  return RunProcess(&app, argc, argv, arguments, registry, [&](const RunSpec& spec) {
+  return RunProcess(arguments, registry, [&](const RunSpec& spec) {
     return ProcessOfComponent(spec, arguments.name, of.name);
   });
 }
 
 int HostMain(int argc, char** argv, const ComponentRegistry& registry) {
-  CLI::App app{
-      "One process of a Poise run: all components that share it. Usually started by `poise run`.",
-      kHostProgram};
-  app.set_version_flag("--version", VersionText(kHostProgram));
+  CatchSignals();
   Arguments arguments;
-  AddOptions(&app, &arguments);
-  app.add_option("--process", arguments.name, "name of the process in the run's graph")->required();
-  return RunProcess(&app, argc, argv, arguments, registry,
-                    [&](const RunSpec&) { return arguments.name; });
+  const std::optional<int> code = ParseProgram(
+      argc, argv, kHostProgram,
+      "One process of a Poise run: all components that share it. Usually started by `poise run`.",
+      OptionsOf(&arguments,
+                {{"--process", &arguments.name, "name of the process in the run's graph", true}}));
+  if (code) return *code;
+  return RunProcess(arguments, registry, [&](const RunSpec&) { return arguments.name; });
 }
 
 int ModuleComponentMain(int argc, char** argv, const char* type, void (*module)()) {
