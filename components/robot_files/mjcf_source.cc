@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <regex>
 
+#include "components/framework/configuration/text_pattern.h"
 #include "components/robot/robot_model.h"
 #include "components/robot/xml_text.h"
 #include "components/robot_files/mjcf_cleaning.h"
@@ -208,7 +208,6 @@ class Assembler {
 
 // A message of MuJoCo's with the file's names in place of those of the cleaned text.
 std::string WithNames(const std::string& problem, const CleanMjcf& clean) {
-  static const std::regex kObject("\\b([bjsga])([0-9]{1,6})\\b");
   const auto name = [&](char kind, size_t i) -> std::string {
     const auto body_of = [&](int b) { return clean.bodies[static_cast<size_t>(b)].name; };
     if (kind == 'b' && i < clean.bodies.size()) return "'" + clean.bodies[i].name + "'";
@@ -224,13 +223,14 @@ std::string WithNames(const std::string& problem, const CleanMjcf& clean) {
     return "";
   };
   std::string text;
-  auto from = problem.begin();
-  for (std::sregex_iterator m(problem.begin(), problem.end(), kObject), end; m != end; ++m) {
-    const std::string known = name(*(*m)[1].first, std::stoul((*m)[2]));
-    text.append(from, (*m)[0].first).append(known.empty() ? m->str() : known);
-    from = (*m)[0].second;
+  size_t from = 0;
+  for (const PatternMatch& match : Matches(problem, "\\b([bjsga])([0-9]{1,6})\\b")) {
+    const auto& [begin, object] = match[0];
+    const std::string known = name(match[1].text.front(), std::stoul(match[2].text));
+    text.append(problem, from, begin - from).append(known.empty() ? object : known);
+    from = begin + object.size();
   }
-  return text.append(from, problem.end());
+  return text.append(problem, from);
 }
 
 }  // namespace

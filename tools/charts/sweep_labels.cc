@@ -1,9 +1,9 @@
 #include "tools/charts/sweep_labels.h"
 
 #include <algorithm>
-#include <regex>
 #include <vector>
 
+#include "components/framework/configuration/text_pattern.h"
 #include "fmt/format.h"
 #include "logging/metrics/metrics.h"
 #include "tools/reference/schemas.h"
@@ -30,8 +30,7 @@ std::string WordsOfField(const std::string& field) {
 /// Returns the unit of a scenario's field, "sim.push[0].peak"; empty when its schema says none.
 std::string UnitOfField(const std::string& field) {
   static const std::vector<FieldEntry> fields = FieldReference(Schema::kScenario);
-  static const std::regex index("\\[[0-9]+\\]");
-  const std::string path = std::regex_replace(field, index, "[i]");
+  const std::string path = WithReplaced(field, "\\[[0-9]+\\]", "[i]");
   const auto known =
       std::ranges::find_if(fields, [&](const FieldEntry& entry) { return entry.path == path; });
   return known == fields.end() ? "" : known->unit;

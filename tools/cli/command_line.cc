@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <memory>
-#include <regex>
 #include <set>
 #include <vector>
 
 #include "components/framework/configuration/suggest.h"
+#include "components/framework/configuration/text_pattern.h"
 #include "fmt/format.h"
 #include "tools/cli/output_style.h"
 #include "tools/cli/text_table.h"
@@ -79,16 +79,15 @@ std::string UnknownFlag(const CLI::App& root, const CLI::App& command,
 /// CLI11 names a checked value by its type and its check, "INT:INT in [1 - 9]": the check says
 /// both.
 std::string WithoutDoubledTypes(const std::string& help) {
-  static const std::regex kChecked(R"(\b(?:INT|FLOAT|TEXT|PART):((?:INT in|FLOAT in|DIR\b|\{)))");
+  const std::string single =
+      WithReplaced(help, R"(\b(?:INT|FLOAT|TEXT|PART):((?:INT in|FLOAT in|DIR\b|\{)))", "$1");
   // A flag that switches off is written there with what it sets.
-  static const std::regex kOff(R"((--[\w-]+)\{false\})");
-  return std::regex_replace(std::regex_replace(help, kChecked, "$1"), kOff, "$1");
+  return WithReplaced(single, R"((--[\w-]+)\{false\})", "$1");
 }
 
 /// A list of choices may be longer than a line, which breaks where a space is.
 std::string WithSpacesInLists(const std::string& help) {
-  static const std::regex kComma(R"(,(?=[\w,-]*\}))");
-  return std::regex_replace(help, kComma, ", ");
+  return WithReplaced(help, R"(,(?=[\w,-]*\}))", ", ");
 }
 
 /// "--inline, --hosted".

@@ -5,10 +5,10 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
-#include <regex>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/suggest.h"
+#include "components/framework/configuration/text_pattern.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "logging/log_messages.h"
@@ -265,8 +265,8 @@ void AddReplayCommand(CLI::App* app, Command* command) {
       ->needs(to_bus)
       ->check(CLI::Validator(
           [](const std::string& url) {
-            static const std::regex form(R"(udpm://\d+\.\d+\.\d+\.\d+:\d+(\?ttl=\d+)?)");
-            return std::regex_match(url, form) ? "" : url + ": must be udpm://GROUP:PORT?ttl=TTL";
+            constexpr char kForm[] = R"(^udpm://\d+\.\d+\.\d+\.\d+:\d+(\?ttl=\d+)?$)";
+            return Matches(url, kForm).empty() ? url + ": must be udpm://GROUP:PORT?ttl=TTL" : "";
           },
           ""));
   replay->callback([options, command] {

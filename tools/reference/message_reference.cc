@@ -1,11 +1,11 @@
 #include "tools/reference/message_reference.h"
 
 #include <algorithm>
-#include <regex>
 #include <sstream>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/suggest.h"
+#include "components/framework/configuration/text_pattern.h"
 #include "fmt/format.h"
 #include "lcmtypes/field_table.h"
 
@@ -52,8 +52,8 @@ std::vector<MessageEntry> MessageReference() {
     for (const MessageEntry& other : messages) {
       const std::string name =  // within a package without it
           other.type.starts_with(package) ? other.type.substr(package.size()) : other.type;
-      const std::regex field(fmt::format("\\n\\s*{}\\s", name));
-      if (std::regex_search(message.definition, field)) message.nested.push_back(other.type);
+      const std::string field = fmt::format("\\n\\s*{}\\s", name);
+      if (!Matches(message.definition, field).empty()) message.nested.push_back(other.type);
     }
   }
   return messages;

@@ -2,8 +2,8 @@
 
 #include <cstdlib>
 #include <map>
-#include <regex>
 
+#include "components/framework/configuration/text_pattern.h"
 #include "fmt/format.h"
 #include "lcmtypes/field_table.h"
 
@@ -14,19 +14,18 @@ using Names = std::map<int64_t, std::string>;
 
 /// By field of one message; `text` is its .lcm file.
 std::map<std::string, Names, std::less<>> NamesIn(const std::string& text) {
-  static const std::regex kComment(R"(//[^\n]*)"), kConstant(R"(([A-Z][A-Z0-9_]*)\s*=\s*(-?\d+))");
-  static const std::regex kField(
-      R"([\w.]+\s+(\w+)(?:\[\w+\])?;[ \t]*//[^\n]*?\b([A-Z]+(?:_[A-Z]+)*_)\*)");
-  const std::string code = std::regex_replace(text, kComment, "");
+  constexpr char kField[] =
+      R"([\w.]+\s+(\w+)(?:\[\w+\])?;[ \t]*//[^\n]*?\b([A-Z]+(?:_[A-Z]+)*_)\*)";
+  const std::vector<PatternMatch> constants =
+      Matches(WithReplaced(text, R"(//[^\n]*)", ""), R"(([A-Z][A-Z0-9_]*)\s*=\s*(-?\d+))");
   std::map<std::string, Names, std::less<>> names;
-  for (std::sregex_iterator field(text.begin(), text.end(), kField), end; field != end; ++field) {
-    const std::string prefix = (*field)[2];
-    for (std::sregex_iterator constant(code.begin(), code.end(), kConstant); constant != end;
-         ++constant) {
-      const std::string name = (*constant)[1];
+  for (const PatternMatch& field : Matches(text, kField)) {
+    const std::string& prefix = field[2].text;
+    for (const PatternMatch& constant : constants) {
+      const std::string& name = constant[1].text;
       if (!name.starts_with(prefix)) continue;
-      names[(*field)[1]].emplace(std::atoll((*constant)[2].str().c_str()),
-                                 name.substr(prefix.size()));
+      names[field[1].text].emplace(std::atoll(constant[2].text.c_str()),
+                                   name.substr(prefix.size()));
     }
   }
   return names;
@@ -45,8 +44,8 @@ std::string ValueName(std::string_view type, std::string_view path, int64_t valu
     std::string text;
     for (const std::string_view file : MessageDefinitions()) {
       const bool here = file.find(fmt::format("package {};", package)) != std::string_view::npos;
-      const std::regex kStruct(fmt::format(R"(struct\s+{}\b)", name));
-      if (here && std::regex_search(file.begin(), file.end(), kStruct)) text = file;
+      const std::string pattern = fmt::format(R"(struct\s+{}\b)", name);
+      if (here && !Matches(std::string(file), pattern).empty()) text = file;
     }
     found = known.emplace(std::string(type), NamesIn(text)).first;
   }

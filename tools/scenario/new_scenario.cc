@@ -1,11 +1,11 @@
 #include "tools/scenario/new_scenario.h"
 
-#include <regex>
 #include <sstream>
 #include <vector>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_path.h"
+#include "components/framework/configuration/text_pattern.h"
 #include "fmt/format.h"
 #include "tools/scenario/catalog.h"
 #include "tools/scenario/former_fields.h"
@@ -35,14 +35,14 @@ class Lines {
   /// Replaces the value that `field` has at the line; its comment stays.
   void Replace(int line, const std::string& field, const std::string& value) {
     std::string& text = lines_.at(static_cast<size_t>(line) - 1);
-    std::smatch match;
-    const std::regex pattern("(^|[\\s;,])" + field + "\\s*:\\s*(\"[^\"]*\"|'[^']*')");
-    if (!std::regex_search(text, match, pattern)) {
+    const std::vector<PatternMatch> matches =
+        Matches(text, "(^|[\\s;,])" + field + "\\s*:\\s*(\"[^\"]*\"|'[^']*')");
+    if (matches.empty()) {
       throw ConfigError(
           fmt::format("line {}: {} and its value must stand on one line", line, field));
     }
-    text.replace(static_cast<size_t>(match.position(2)), static_cast<size_t>(match.length(2)),
-                 Quoted(value));
+    const auto& [begin, old] = matches.front()[2];
+    text.replace(begin, old.size(), Quoted(value));
   }
   void InsertBefore(size_t line, const std::string& text) {
     lines_.insert(lines_.begin() + static_cast<std::ptrdiff_t>(line), text);

@@ -10,12 +10,12 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <regex>
 #include <string>
 #include <vector>
 
 #include "components/framework/configuration/added_fields.h"
 #include "components/framework/configuration/suggest.h"
+#include "components/framework/configuration/text_pattern.h"
 #include "fmt/format.h"
 
 namespace poise {
@@ -52,15 +52,16 @@ class FirstError final : public google::protobuf::io::ErrorCollector {
  private:
   /// What the parser does not say of a field that there is not: which one is near.
   static std::string Meant(const std::string& problem) {
-    static const std::regex kNoField(R"re("([\w.]+)" has no field named "(\w+)")re");
-    std::smatch parts;
-    if (!std::regex_search(problem, parts, kNoField)) return "";
+    const std::vector<PatternMatch> matches =
+        Matches(problem, R"re("([\w.]+)" has no field named "(\w+)")re");
+    if (matches.empty()) return "";
+    const PatternMatch& parts = matches.front();
     const auto* const type =
-        google::protobuf::DescriptorPool::generated_pool()->FindMessageTypeByName(parts[1]);
+        google::protobuf::DescriptorPool::generated_pool()->FindMessageTypeByName(parts[1].text);
     if (type == nullptr) return "";
     std::vector<std::string> names;
     for (int i = 0; i < type->field_count(); ++i) names.push_back(type->field(i)->name());
-    const std::vector<std::string> near = Nearest(parts[2].str(), names);
+    const std::vector<std::string> near = Nearest(parts[2].text, names);
     std::string text;
     for (const std::string& name : near) text += (text.empty() ? "" : " or ") + name;
     return text.empty() ? "" : fmt::format(" Did you mean {}?", text);
