@@ -40,6 +40,10 @@ std::vector<PortType> SimPorts() {
           Writes<ground_truth_t>("ground_truth")};
 }
 
+SimComponent::SimComponent(SimReader read) : read_(std::move(read)) {}
+
+SimComponent::~SimComponent() = default;
+
 void SimComponent::Configure(const ComponentContext& context, Wiring* wiring) {
   const SimSetup setup = read_(context);
   const std::shared_ptr<const robot::RobotModel> model = LoadRobot(context);

@@ -5,7 +5,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "components/framework/component.h"
@@ -46,7 +45,8 @@ std::vector<PortType> SimPorts();
 /// "sim.": the configuration of an engine's process has a field `sim` (SimConfig) beside its own.
 class SimComponent : public Component, public Operated {
  public:
-  explicit SimComponent(SimReader read) : read_(std::move(read)) {}
+  explicit SimComponent(SimReader read);
+  ~SimComponent() override;  // here, or each engine would compile the ports anew
   void Configure(const ComponentContext& context, Wiring* wiring) override;
   std::string_view finished() const override;
   bool failed() const override { return !finished().empty(); }
