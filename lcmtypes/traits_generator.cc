@@ -238,7 +238,12 @@ void WriteHeader(const std::string& set, const std::vector<Message>& messages,
   out << "\nnamespace poise {\n\n";
   for (const Message& m : messages) WriteTraits(m, all, out);
   if (set == "poise") {
-    out << "// Calls f.template operator()<T>() for every message type of Poise's own with a "
+    out << "// X(T) for every message type of Poise's own that a component's port can carry.\n"
+        << "#define POISE_PORT_MESSAGES(X)";
+    for (const Message& m : messages) {
+      if (m.has_header && !m.has_strings) out << " \\\n  X(" << m.lcm.name << ")";
+    }
+    out << "\n\n// Calls f.template operator()<T>() for every message type of Poise's own with a "
            "header.\n"
         << "template <class F>\nvoid ForEachMessageType(F&& f) {\n";
     for (const Message& m : messages) {

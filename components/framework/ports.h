@@ -173,4 +173,11 @@ class Output final : public OutputPort {
   T message_{};
 };
 
+// Of Poise's own messages they stand in ports.cc: each component would compile its ports anew.
+#define POISE_EXTERN_PORTS(T)     \
+  extern template class Input<T>; \
+  extern template class Output<T>;
+POISE_PORT_MESSAGES(POISE_EXTERN_PORTS)
+#undef POISE_EXTERN_PORTS
+
 }  // namespace poise
