@@ -1,49 +1,19 @@
 // The program `poise`: runs, checks and inspects process graphs.
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <csignal>
-#include <cstdio>
-#include <cstring>
 #include <exception>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "components/framework/build_info.h"
-#include "components/framework/configuration/configuration.h"
 #include "components/framework/modules.h"
-#include "components/framework/say_error.h"
-#include "components/robot/robot_model.h"
 #include "fmt/format.h"
-#include "logging/printable.h"
 #include "tools/cli/command_line.h"
+#include "tools/cli/exit_code.h"
 #include "tools/cli/output_style.h"
 #include "tools/commands/commands.h"
 #include "tools/scenario/described_components.h"
 #include "tools/scenario/registry.h"
-
-namespace {
-
-void Fail(std::string_view problem) {
-  std::fflush(stdout);
-  poise::SayError(fmt::format("poise: {}", poise::logging::LinesForTerminal(problem)));
-}
-
-/// `code`, or failure where what was printed has not come out: a full disk behind a redirection.
-int Flushed(int code) {
-  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
-  struct stat out {};
-  const bool pipe =
-      fstat(STDOUT_FILENO, &out) == 0 && (S_ISFIFO(out.st_mode) || S_ISSOCK(out.st_mode));
-  if (pipe) return code;  // its reader has what it wanted
-  Fail(fmt::format("standard output: cannot be written: {}", std::strerror(errno)));
-  return code == poise::kExitOk ? poise::kExitFailed : code;
-}
-
-}  // namespace
 
 int main(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);  // a file that grows too large is an error that is told
@@ -68,6 +38,12 @@ int main(int argc, char** argv) {
       "wrong usage or configuration, 3 in real time, nothing failed but that processes were lost "
       "and replaced or the machine was late.\n"
       "Start with: poise run, then poise report");
+  const auto say = [](const std::string& text) {
+    return poise::ExitCodeOf([&] {
+      fmt::print("{}", text);
+      return poise::kExitOk;
+    });
+  };
   poise::Command command;
   poise::AddRunCommand(&app, &command);
   poise::AddMatrixCommand(&app, &command);
@@ -103,39 +79,29 @@ int main(int argc, char** argv) {
     }
     // An unset variable of a script: a default in its place would write elsewhere than was meant.
     if (const auto empty = std::ranges::find(arguments, ""); empty != arguments.end()) {
-      Fail(empty == arguments.begin()
-               ? "the first argument is empty"
-               : fmt::format("the argument after '{}' is empty; give it a value or leave it out",
-                             *std::prev(empty)));
+      poise::SayProblem(
+          empty == arguments.begin()
+              ? "the first argument is empty"
+              : fmt::format("the argument after '{}' is empty; give it a value or leave it out",
+                            *std::prev(empty)));
       return poise::kExitUsage;
     }
     std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes them
     app.parse(arguments);
   } catch (const CLI::CallForHelp&) {
-    fmt::print("{}", poise::HelpText(app));
-    return Flushed(poise::kExitOk);
+    return say(poise::HelpText(app));
   } catch (const CLI::CallForVersion& version) {
-    fmt::print("{}\n", version.what());
-    return Flushed(poise::kExitOk);
+    return say(fmt::format("{}\n", version.what()));
   } catch (const CLI::ParseError& error) {
     if (poise::WantsSubcommand(app, error)) {
       fmt::print("{}", poise::HelpText(app));
     } else {
-      Fail(poise::UsageProblem(app, error));
+      poise::SayProblem(poise::UsageProblem(app, error));
     }
     return poise::kExitUsage;
   }
-  try {
+  return poise::ExitCodeOf([&] {
     if (modules) std::rethrow_exception(modules);
-    return Flushed(command());
-  } catch (const poise::ConfigError& error) {
-    Fail(error.what());
-    return poise::kExitUsage;
-  } catch (const poise::robot::RobotError& error) {
-    Fail(error.what());
-    return poise::kExitUsage;
-  } catch (const std::exception& error) {
-    Fail(error.what());
-    return poise::kExitFailed;
-  }
+    return command();
+  });
 }

@@ -7,13 +7,9 @@
 #include <string>
 #include <utility>
 
-namespace poise {
+#include "tools/cli/exit_code.h"
 
-inline constexpr int kExitOk = 0;
-inline constexpr int kExitFailed = 1;  ///< a check or the run failed
-inline constexpr int kExitUsage = 2;   ///< wrong usage or configuration
-/// In real time: nothing failed but by a machine that was too late, or by an injected fault.
-inline constexpr int kExitMachine = 3;
+namespace poise {
 
 /// What the parsed command line asks for; returns the exit code.
 using Command = std::function<int()>;

@@ -6,7 +6,6 @@
 #include "tools/commands/commands.h"
 #include "tools/live/interactive_run.h"
 #include "tools/run/inline_run.h"
-#include "tools/run/scenario_run.h"
 #include "tools/run/several_runs.h"
 #include "tools/sweep/sweep_session.h"
 
@@ -14,7 +13,7 @@ namespace poise {
 namespace {
 
 struct RunArguments {
-  std::vector<std::string> scenarios = {"push_double_support"};
+  std::vector<std::string> scenarios = {kFirstScenario};
   std::string out;
   RunOptions options;
   bool no_reference = false;
@@ -39,14 +38,7 @@ int Run(RunArguments arguments) {
   arguments.options.changes.reference = !arguments.no_reference;
   const std::string& capture = arguments.options.changes.capture;
   if (!capture.empty()) CheckFileFree("--capture", capture, arguments.options.force);
-  const std::vector<std::string>& names = arguments.scenarios;
-  if (names.size() == 1 && names.front() != kAllScenarios) {
-    const RunResult result = ScenarioRun(names.front(), arguments.options)
-                                 .Run(arguments.out, /*latest=*/arguments.out.empty());
-    if (result.summary.failed_by_machine) return kExitMachine;
-    return result.summary.passed ? kExitOk : kExitFailed;
-  }
-  return RunSeveral(names, arguments.options, arguments.out) ? kExitOk : kExitFailed;
+  return RunScenarios(arguments.scenarios, arguments.options, arguments.out);
 }
 
 }  // namespace

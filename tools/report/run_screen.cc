@@ -241,8 +241,9 @@ std::string FormatNext(const Scenario& scenario, const std::vector<CheckResult>&
 
 std::string ProgramName() {
   std::error_code error;
-  const fs::path self = fs::read_symlink("/proc/self/exe", error);
+  fs::path self = fs::read_symlink("/proc/self/exe", error);
   if (error) return "poise";
+  if (self.filename() == "first_run") self.replace_filename("poise");  // which is built next
   const char* const path = std::getenv("PATH");
   const std::string_view folders = path == nullptr ? "" : path;
   for (size_t begin = 0; begin < folders.size();) {

@@ -8,6 +8,7 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
+#include "tools/cli/exit_code.h"
 #include "tools/cli/signals.h"
 #include "tools/cli/text_table.h"
 #include "tools/run/run_dir.h"
@@ -144,6 +145,16 @@ bool RunSeveral(const std::vector<std::string>& names, const RunOptions& options
   }
   fmt::print("{}\n", passed ? "all passed" : "FAILED");
   return passed;
+}
+
+int RunScenarios(const std::vector<std::string>& names, const RunOptions& options,
+                 const std::string& out) {
+  if (names.size() != 1 || names.front() == kAllScenarios) {
+    return RunSeveral(names, options, out) ? kExitOk : kExitFailed;
+  }
+  const RunResult result = ScenarioRun(names.front(), options).Run(out, /*latest=*/out.empty());
+  if (result.summary.failed_by_machine) return kExitMachine;
+  return result.summary.passed ? kExitOk : kExitFailed;
 }
 
 }  // namespace poise

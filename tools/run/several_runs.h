@@ -9,6 +9,9 @@
 
 namespace poise {
 
+/// The scenario that is run where none is named.
+inline constexpr char kFirstScenario[] = "push_double_support";
+
 /// Name that means every scenario with a paper_section.
 inline constexpr char kAllScenarios[] = "all";
 
@@ -25,5 +28,10 @@ std::string UniqueName(const std::string& name, std::set<std::string>* taken);
 /// run and the rest. True when all passed. Throws as ScenarioRun does; nothing has run then.
 bool RunSeveral(const std::vector<std::string>& names, const RunOptions& options,
                 const std::string& out);
+
+/// Runs one scenario into `out` (empty: a dated folder, where runs/latest then points), or several
+/// as RunSeveral. Gives the exit code. Throws as ScenarioRun does.
+int RunScenarios(const std::vector<std::string>& names, const RunOptions& options,
+                 const std::string& out);
 
 }  // namespace poise

@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# deploy/run in a new checkout: runs as soon as first_run is built, and leaves everything built; with flags, all is built first.
+# Usage: first_run_test.sh SOURCE_DIR
+set -euo pipefail
+source_dir=$1
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+fail() { echo "FAILED: $1" >&2; exit 1; }
+
+# A deploy/setup that tells what it is asked for, and builds programs that tell how they are called.
+mkdir -p "$work/deploy" "$work/build/release/bin"
+cp "$source_dir/deploy/run" "$work/deploy/"
+cat >"$work/deploy/setup" <<'SETUP'
+#!/bin/sh
+echo "setup $*"
+program=$(dirname "$0")/../build/release/bin/$2
+printf '#!/bin/sh\necho "%s $*"\nexit 1\n' "$2" >"$program"
+chmod +x "$program"
+SETUP
+chmod +x "$work/deploy/setup"
+
+# Its lines, and its exit code, which is the run's.
+run() { ("$work/deploy/run" "$@" && echo 0 || echo $?) | grep -v -e '^$' -e '^Building' | tr '\n' '|'; }
+expect() { [ "$2" = "$3" ] || fail "$1: $2"; }
+
+expect 'a new checkout' "$(run push)" 'setup --quiet first_run|first_run push|setup --quiet poise|1|'
+expect 'a built one' "$(run push)" 'setup --quiet poise|poise run push|1|'
+rm "$work"/build/release/bin/*
+expect 'a new checkout, with flags' "$(run push --inline)" 'setup --quiet poise|poise run push --inline|1|'
+echo 'first_run runs first in a new checkout alone'
