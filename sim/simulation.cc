@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <string>
 #include <utility>
@@ -487,36 +488,31 @@ void Simulation::DetectFall() {
     ground = std::min(truth_.foot_pose[0].translation().z(), truth_.foot_pose[1].translation().z());
   }
   const double share = (truth_.com.z() - ground) / start_com_height_;
-  constexpr size_t kRoom = sizeof end_reason_ - 1;
   if (tilt > fall_tilt_) {
     fallen_ = true;
-    *fmt::format_to_n(end_reason_, kRoom, "the robot fell at {:.3f} s (body tilt {:.2f} rad)",
-                      time(), tilt)
-         .out = '\0';
+    std::snprintf(end_reason_, sizeof end_reason_, "the robot fell at %.3f s (body tilt %.2f rad)",
+                  time(), tilt);
   } else if (share < fall_height_) {
     fallen_ = true;
-    *fmt::format_to_n(end_reason_, kRoom,
-                      "the robot fell at {:.3f} s (centre of mass at {:.0f} % of its height)",
-                      time(), 100 * share)
-         .out = '\0';
+    std::snprintf(end_reason_, sizeof end_reason_,
+                  "the robot fell at %.3f s (centre of mass at %.0f %% of its height)", time(),
+                  100 * share);
   }
 }
 
 void Simulation::CheckCrane() {
   if (!crane_ || crane_->let_go() || steps_ < 0 || end_reason_[0] != '\0') return;
-  *fmt::format_to_n(end_reason_, sizeof end_reason_ - 1,
-                    "the crane still holds the robot at {:.3f} s: the bridge has followed commands "
-                    "for {:.3f} s without a break; give the scenario a longer lead",
-                    time(), crane_->followed())
-       .out = '\0';
+  std::snprintf(end_reason_, sizeof end_reason_,
+                "the crane still holds the robot at %.3f s: the bridge has followed commands for "
+                "%.3f s without a break; give the scenario a longer lead",
+                time(), crane_->followed());
 }
 
 void Simulation::Break(std::string_view reason) {
   broken_ = true;
   if (fallen_) return;  // why the run ends is already said
-  *fmt::format_to_n(end_reason_, sizeof end_reason_ - 1,
-                    "the simulation broke down at {:.3f} s: {}", time(), reason)
-       .out = '\0';
+  std::snprintf(end_reason_, sizeof end_reason_, "the simulation broke down at %.3f s: %.*s",
+                time(), static_cast<int>(reason.size()), reason.data());
 }
 
 }  // namespace poise

@@ -39,10 +39,10 @@ class Row final : public ScalarVisitor {
   explicit Row(const MessageType& type, std::string* to) : skip_(HeaderScalars(type)), to_(to) {}
 
   void Integer(std::string_view, int64_t value) override {
-    if (Begin()) fmt::format_to(std::back_inserter(*to_), "{}", value);
+    if (Begin()) *to_ += fmt::format("{}", value);
   }
   void Real(std::string_view, double value) override {
-    if (Begin() && !std::isnan(value)) fmt::format_to(std::back_inserter(*to_), "{}", value);
+    if (Begin() && !std::isnan(value)) *to_ += fmt::format("{}", value);
   }
   void Text(std::string_view, std::string_view value) override {
     if (Begin()) *to_ += CsvCell(value);
