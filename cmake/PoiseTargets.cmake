@@ -86,7 +86,7 @@ function(poise_reuse_headers name from)
   endif()
 endfunction()
 
-# Many small files are compiled together, which saves time; what instantiates much of Eigen gains nothing by it.
+# Many small files are compiled together, which saves time.
 # A build with -DPOISE_UNITE=OFF (the presets sanitize and debug, and who changes one file again and again) compiles each
 # by itself.
 option(POISE_UNITE "Compile small files of a target together" ON)

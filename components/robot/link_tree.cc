@@ -9,7 +9,6 @@ namespace poise::robot {
 namespace {
 
 constexpr double kMinAxisNorm = 1e-6;
-constexpr double kMaxLength = 1e3;  // m: beyond it, a mistaken unit and lost digits
 
 const char* TypeName(JointKind kind) {
   switch (kind) {

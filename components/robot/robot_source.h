@@ -12,6 +12,9 @@
 
 namespace poise::robot {
 
+/// m, between two links: beyond it, a mistaken unit and lost digits.
+inline constexpr double kMaxLength = 1e3;
+
 struct SourceLink {
   std::string name;
   MassProperties mass;  ///< in the link frame

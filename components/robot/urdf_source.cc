@@ -11,8 +11,6 @@
 namespace poise::robot {
 namespace {
 
-constexpr double kMaxLength = 1e3;  // m: beyond it, a mistaken unit and lost digits
-
 Eigen::Vector3d ToEigen(const urdf::Vector3& v) { return {v.x, v.y, v.z}; }
 
 Eigen::Isometry3d ToEigen(const urdf::Pose& pose, const std::string& what) {

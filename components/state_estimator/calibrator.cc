@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "components/state_estimator/lie_group.h"
+#include "components/state_estimator/square.h"
 
 namespace poise {
 namespace {
@@ -16,8 +17,6 @@ using robot::kFeet;
 // Standard deviations at first: of the mass a share of the robot's, of its place m. A load of 15 %
 // anywhere, a COM off by 3 cm.
 constexpr double kStartMass = 0.15, kStartShift = 0.05;
-
-double Square(double x) { return x * x; }
 
 }  // namespace
 

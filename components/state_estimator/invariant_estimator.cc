@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "components/robot/sole.h"
+#include "components/state_estimator/square.h"
 
 namespace poise {
 namespace {
@@ -48,8 +49,6 @@ constexpr double kTogether = 0.02;  // m/s
 // Beyond these nothing is known of the base: in flight, or on a hoist, for minutes.
 constexpr double kLostTilt = 0.5, kLostSpeed = 10;  // rad, m/s, standard deviations
 constexpr double kRecoverTilt = 0.1, kRecoverSpeed = 1, kRecoverPosition = 1;
-
-double Square(double x) { return x * x; }
 
 /// What nobody gave is the robot's, and the IMU's noise is its own at least.
 InvariantEkfConfig WithRobot(InvariantEkfConfig config, const robot::RobotModel& model) {

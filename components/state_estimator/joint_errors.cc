@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "components/state_estimator/square.h"
+
 namespace poise {
 namespace {
 
@@ -20,8 +22,6 @@ constexpr double kFreeTime = 0.05;
 constexpr double kFreeExcess = 22.46;
 // Standard deviations of the load at which it is free no longer, likewise.
 constexpr double kFreePress = 3.1;
-
-double Square(double x) { return x * x; }
 
 }  // namespace
 

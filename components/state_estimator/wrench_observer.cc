@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "components/state_estimator/lie_group.h"
+#include "components/state_estimator/square.h"
 
 namespace poise {
 namespace {
@@ -19,7 +20,7 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Matrix6x12 = Eigen::Matrix<double, 6, 12>;
 
 // No robot exceeds these: they keep every finite reading from making a number that is not.
-constexpr double kMaxPosition = 1e3, kMaxRate = 100, kMaxForce = 1e3, kMaxTorque = 1e4;
+constexpr double kMaxPosition = 1e3, kMaxRate = 100, kMaxForce = 1e3, kMaxJointTorque = 1e4;
 constexpr double kLongestStep = 0.1;  // s: after a longer gap the filter starts anew
 // What is known before any row: no foot carries more, shares of the weight, and of the weight at a
 // metre.
@@ -32,8 +33,6 @@ constexpr double kFitTime = 0.3, kPressedFitTime = 5, kFitHold = 1;
 constexpr double kLeastFit = 0.1;  // a third of the deviation
 // s, over which the wrenches' rate of change is averaged.
 constexpr double kRateTime = 0.02;
-
-double Square(double x) { return x * x; }
 
 }  // namespace
 
@@ -93,7 +92,7 @@ void WrenchObserver::Track(const BaseSensors& sensors, double dt) {
   input_.segment<3>(n + 3) = within(sensors.acceleration, kMaxForce);
   torque_known_ = sensors.joint_torque.size() == n && !sensors.joint_torque.isZero(0);
   if (torque_known_) {
-    input_.tail(n) = within(sensors.joint_torque, kMaxTorque);
+    input_.tail(n) = within(sensors.joint_torque, kMaxJointTorque);
   } else {
     input_.tail(n).setZero();
   }

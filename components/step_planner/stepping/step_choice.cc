@@ -30,7 +30,7 @@ constexpr int kStepsAhead = 2;        // after the one that is chosen
 constexpr double kCostOfStep = 0.01;  // m of margin that a step must be worth
 // m that a stride's foothold may be off before the foot comes down sooner, by so many s at a time.
 constexpr double kMissed = 0.01, kSooner = 0.02;
-constexpr int kHalvings = 5;  // of a foothold's way back to where the legs are clear
+constexpr int kWayHalvings = 5;  // of a foothold's way back to where the legs are clear
 
 /// The segment keeps out of |x| < half.x, y < half.y, where the stance leg is, and beyond it, where
 /// the swing leg does not get around it.
@@ -87,7 +87,7 @@ bool StepChoice::ClearOfLeg(Foot foot, const Vector2d& com, Vector2d* foothold) 
   const double side = Side(foot);
   Vector2d in = {foothold->x(), side * reach_.least_spacing()}, out = *foothold;
   if (!clear(in)) return false;
-  for (int i = 0; i < kHalvings; ++i) {
+  for (int i = 0; i < kWayHalvings; ++i) {
     const Vector2d middle = 0.5 * (in + out);
     (clear(middle) ? in : out) = middle;
   }
