@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <string>
 #include <utility>
@@ -52,6 +51,13 @@ int StepsPerTick(const SimConfig& config, double tick_period) {
                                           config.step(), tick_period, tick_period));
   }
   return static_cast<int>(whole);
+}
+
+/// A text of a tick, cut where there is no more room: nothing is allocated.
+template <size_t room, typename... Values>
+void WriteText(char (&to)[room], fmt::format_string<Values...> text, Values... values) {
+  *fmt::vformat_to_n(&to[0], room - 1, fmt::string_view(text), fmt::make_format_args(values...))
+       .out = '\0';
 }
 
 Drivetrain::Options DrivetrainOptions(const RobotModel& model,
@@ -490,29 +496,25 @@ void Simulation::DetectFall() {
   const double share = (truth_.com.z() - ground) / start_com_height_;
   if (tilt > fall_tilt_) {
     fallen_ = true;
-    std::snprintf(end_reason_, sizeof end_reason_, "the robot fell at %.3f s (body tilt %.2f rad)",
-                  time(), tilt);
+    WriteText(end_reason_, "the robot fell at {:.3f} s (body tilt {:.2f} rad)", time(), tilt);
   } else if (share < fall_height_) {
     fallen_ = true;
-    std::snprintf(end_reason_, sizeof end_reason_,
-                  "the robot fell at %.3f s (centre of mass at %.0f %% of its height)", time(),
-                  100 * share);
+    WriteText(end_reason_, "the robot fell at {:.3f} s (centre of mass at {:.0f} % of its height)", time(),
+        100 * share);
   }
 }
 
 void Simulation::CheckCrane() {
   if (!crane_ || crane_->let_go() || steps_ < 0 || end_reason_[0] != '\0') return;
-  std::snprintf(end_reason_, sizeof end_reason_,
-                "the crane still holds the robot at %.3f s: the bridge has followed commands for "
-                "%.3f s without a break; give the scenario a longer lead",
-                time(), crane_->followed());
+  WriteText(end_reason_, "the crane still holds the robot at {:.3f} s: the bridge has followed commands for {:.3f} s "
+      "without a break; give the scenario a longer lead",
+      time(), crane_->followed());
 }
 
 void Simulation::Break(std::string_view reason) {
   broken_ = true;
   if (fallen_) return;  // why the run ends is already said
-  std::snprintf(end_reason_, sizeof end_reason_, "the simulation broke down at %.3f s: %.*s",
-                time(), static_cast<int>(reason.size()), reason.data());
+  WriteText(end_reason_, "the simulation broke down at {:.3f} s: {}", time(), reason);
 }
 
 }  // namespace poise
