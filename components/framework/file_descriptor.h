@@ -14,7 +14,8 @@ class FileDescriptor {
   FileDescriptor(int fd = -1) : fd_(fd) {}  // NOLINT: what a call gives is owned
   FileDescriptor(FileDescriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
   FileDescriptor& operator=(FileDescriptor&& other) noexcept {
-    std::swap(fd_, other.fd_);
+    FileDescriptor taken(std::move(other));  // what was owned is closed with it
+    std::swap(fd_, taken.fd_);
     return *this;
   }
   ~FileDescriptor() {
