@@ -1,5 +1,5 @@
-// `poise run [SCENARIO...]` without flags, and nothing else: what deploy/run builds first on a new
-// checkout, since the other commands of `poise` take as long again to compile.
+// The program does what `poise run [SCENARIO...]` without flags does. deploy/run builds it first on a
+// new checkout, since the other commands of `poise` take as long again to compile.
 #include <csignal>
 #include <string>
 #include <vector>

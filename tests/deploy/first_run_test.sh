@@ -14,17 +14,26 @@ cat >"$work/deploy/setup" <<'SETUP'
 #!/bin/sh
 echo "setup $*"
 program=$(dirname "$0")/../build/release/bin/$2
-printf '#!/bin/sh\necho "%s $*"\nexit 1\n' "$2" >"$program"
+printf '#!/bin/sh\necho "%s $*"\nexit '"${ends:-1}"'\n' "$2" >"$program"
 chmod +x "$program"
+[ "$2" != "${fails:-}" ] || exit 7
 SETUP
 chmod +x "$work/deploy/setup"
 
 # Its lines, and its exit code, which is the run's.
+export ends fails
 run() { ("$work/deploy/run" "$@" && echo 0 || echo $?) | grep -v -e '^$' -e '^Building' | tr '\n' '|'; }
 expect() { [ "$2" = "$3" ] || fail "$1: $2"; }
 
 expect 'a new checkout' "$(run push)" 'setup --quiet first_run|first_run push|setup --quiet poise|1|'
 expect 'a built one' "$(run push)" 'setup --quiet poise|poise run push|1|'
 rm "$work"/build/release/bin/*
+expect 'a new checkout, an empty name' "$(run '')" 'setup --quiet poise|poise run |1|'
+rm "$work"/build/release/bin/*
 expect 'a new checkout, with flags' "$(run push --inline)" 'setup --quiet poise|poise run push --inline|1|'
+rm "$work"/build/release/bin/*
+expect 'a name that is none' "$(ends=2 run pusch)" 'setup --quiet first_run|first_run pusch|2|'
+expect 'what else there is cannot be built' "$(fails=poise run push 2>/dev/null)" 'setup --quiet first_run|first_run push|setup --quiet poise|1|'
+rm "$work"/build/release/bin/*
+expect 'nothing can be built' "$(fails=first_run run push)" 'setup --quiet first_run|7|'
 echo 'first_run runs first in a new checkout alone'
