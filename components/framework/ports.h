@@ -173,7 +173,8 @@ class Output final : public OutputPort {
   T message_{};
 };
 
-// Of Poise's own messages they stand in ports.cc: each component would compile its ports anew.
+// The ports of Poise's own messages are instantiated in ports.cc: each component would compile them
+// anew.
 #define POISE_EXTERN_PORTS(T)     \
   extern template class Input<T>; \
   extern template class Output<T>;

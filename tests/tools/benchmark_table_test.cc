@@ -4,10 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <fstream>
 
 #include "components/framework/configuration/configuration.h"
+#include "tests/logging/log_test_support.h"
 #include "tools/benchmark/benchmark_set.h"
 
 namespace poise {
@@ -143,23 +143,22 @@ TEST(BenchmarkSetTest, EachSetIsFixed) {
 }
 
 TEST(BenchmarkSetTest, AChangeThatCannotBeIsNamedByFileAndLine) {
-  const std::filesystem::path file =
-      std::filesystem::temp_directory_path() / "poise_changed_set.pbtxt";
+  const logging::TemporaryFolder folder;
+  const std::string file = folder.path("changed_set.pbtxt");
   const auto problem = [&](const char* change) -> std::string {
     std::ofstream(file) << "base: \"balance_4\"\nname: \"mine\"\nset: \"" << change << "\"\n";
     try {
-      BenchmarkSet(file.string(), BenchmarkSubject());
+      BenchmarkSet(file, BenchmarkSubject());
     } catch (const ConfigError& error) {
       return error.what();
     }
     return "";
   };
   EXPECT_EQ(problem("part[blocks].quick=1"), "");
-  EXPECT_THAT(problem("part[block].quick=1"), HasSubstr(file.string() + ":3: set[0]: "));
+  EXPECT_THAT(problem("part[block].quick=1"), HasSubstr(file + ":3: set[0]: "));
   EXPECT_THAT(problem("part[block].quick=1"), HasSubstr("no part is called 'block'"));
   EXPECT_THAT(problem("part[blocks].quick"), HasSubstr("write FIELD=VALUE"));
   EXPECT_THAT(problem("part[blocks].quick=0"), HasSubstr("quick"));
-  std::filesystem::remove(file);
 }
 
 }  // namespace
