@@ -600,7 +600,7 @@ test('what a robot has no sensor for is told as it is observed, not as zero', as
   await page.evaluate(() => window.poise.player.seek(0.3));
   const value = (name) => page.locator('.readout tr', {hasText: name}).locator('td').innerText();
   for (const foot of ['right', 'left']) {
-    for (const load of ['measured', 'computed']) assert.match(await value(`${foot} load, ${load}`), /^\d{2,} N$/);
+    for (const load of ['observed', 'computed']) assert.match(await value(`${foot} load, ${load}`), /^\d{2,} N$/);
   }
   assert.match(await page.locator('#header').innerText(), /robot=heron\/heron[^]*robot heron/);
   assert.deepEqual(problems, []);
