@@ -8,7 +8,7 @@ set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME poise)
 set_target_properties(poise PROPERTIES INSTALL_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR}")
 install(TARGETS poise DESTINATION bin)
 get_property(_programs GLOBAL PROPERTY POISE_PROGRAMS)
-list(REMOVE_ITEM _programs poise first_run)  # the one is not of lib/, the other of a new checkout alone
+list(REMOVE_ITEM _programs poise first_run)  # poise goes into bin/, and first_run serves a new checkout alone
 set_target_properties(${_programs} PROPERTIES INSTALL_RPATH "$ORIGIN/../../../${CMAKE_INSTALL_LIBDIR}")
 install(TARGETS ${_programs} DESTINATION lib/poise/bin)
 install(TARGETS poise_traits_generator DESTINATION lib/poise/bin COMPONENT dev)

@@ -46,7 +46,7 @@ std::vector<PortType> SimPorts();
 class SimComponent : public Component, public Operated {
  public:
   explicit SimComponent(SimReader read);
-  ~SimComponent() override;  // here, or each engine would compile the ports anew
+  ~SimComponent() override;  // defined in the .cc: each engine would compile the ports anew
   void Configure(const ComponentContext& context, Wiring* wiring) override;
   std::string_view finished() const override;
   bool failed() const override { return !finished().empty(); }

@@ -53,7 +53,7 @@ int StepsPerTick(const SimConfig& config, double tick_period) {
   return static_cast<int>(whole);
 }
 
-/// A text of a tick, cut where there is no more room: nothing is allocated.
+/// Writes a text and cuts it where there is no more room: a tick allocates nothing.
 template <size_t room, typename... Values>
 void WriteText(char (&to)[room], fmt::format_string<Values...> text, Values... values) {
   *fmt::vformat_to_n(&to[0], room - 1, fmt::string_view(text), fmt::make_format_args(values...))
@@ -499,14 +499,16 @@ void Simulation::DetectFall() {
     WriteText(end_reason_, "the robot fell at {:.3f} s (body tilt {:.2f} rad)", time(), tilt);
   } else if (share < fall_height_) {
     fallen_ = true;
-    WriteText(end_reason_, "the robot fell at {:.3f} s (centre of mass at {:.0f} % of its height)", time(),
-        100 * share);
+    WriteText(end_reason_, "the robot fell at {:.3f} s (centre of mass at {:.0f} % of its height)",
+              time(), 100 * share);
   }
 }
 
 void Simulation::CheckCrane() {
   if (!crane_ || crane_->let_go() || steps_ < 0 || end_reason_[0] != '\0') return;
-  WriteText(end_reason_, "the crane still holds the robot at {:.3f} s: the bridge has followed commands for {:.3f} s "
+  WriteText(
+      end_reason_,
+      "the crane still holds the robot at {:.3f} s: the bridge has followed commands for {:.3f} s "
       "without a break; give the scenario a longer lead",
       time(), crane_->followed());
 }

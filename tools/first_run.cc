@@ -1,5 +1,5 @@
-// The program does what `poise run [SCENARIO...]` without flags does. deploy/run builds it first on a
-// new checkout, since the other commands of `poise` take as long again to compile.
+// The program does what `poise run [SCENARIO...]` without flags does. deploy/run builds it first on
+// a new checkout, since all commands of `poise` take half as long again to compile.
 #include <csignal>
 #include <string>
 #include <vector>

@@ -1,4 +1,4 @@
-// What standard deviations become variances by.
+// A standard deviation becomes a variance.
 #pragma once
 
 namespace poise {

@@ -6,7 +6,7 @@
     docs/concepts/pictures/animate.py --check push    # writes nothing; exit code 1 where the file differs from what is drawn
 
 Of a run the true state of the simulated robot moves the links, through poise.Robot; the controller's messages give the
-rest.
+rest. All films stand in this one file, since they share Film, its styles and the list of names.
 """
 import math
 import re
