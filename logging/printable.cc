@@ -1,6 +1,8 @@
 #include "logging/printable.h"
 
 #include <algorithm>
+#include <boost/archive/iterators/base64_from_binary.hpp>
+#include <boost/archive/iterators/transform_width.hpp>
 #include <nlohmann/json.hpp>
 
 #include "fmt/format.h"
@@ -24,6 +26,13 @@ std::string Printable(std::string_view text, std::string_view quote) {
     }
   }
   return escaped;
+}
+
+std::string Base64(std::string_view bytes) {
+  using boost::archive::iterators::base64_from_binary, boost::archive::iterators::transform_width;
+  using Digits = base64_from_binary<transform_width<const char*, 6, 8>>;
+  std::string text(Digits(bytes.data()), Digits(bytes.data() + bytes.size()));
+  return text.append((3 - bytes.size() % 3) % 3, '=');
 }
 
 std::string CsvCell(std::string_view text) {

@@ -1,4 +1,4 @@
-// Text from a bus or a log, fit to be shown.
+// Text and bytes from a bus or a log, fit to be shown.
 #pragma once
 
 #include <string>
@@ -17,6 +17,9 @@ std::string LinesForTerminal(std::string_view text);
 
 /// `text` as a cell of a CSV file (RFC 4180): in quotes where it must be.
 std::string CsvCell(std::string_view text);
+
+/// Bytes as text, padded with = to whole groups of four (RFC 4648, 4).
+std::string Base64(std::string_view bytes);
 
 bool IsUtf8(std::string_view text);
 /// True for UTF-8 without control characters.

@@ -1,6 +1,5 @@
 #include "logging/export/column_codec.h"
 
-#include <google/protobuf/stubs/strutil.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -10,6 +9,8 @@
 #include <limits>
 #include <stdexcept>
 #include <vector>
+
+#include "logging/printable.h"
 
 namespace poise::logging {
 namespace {
@@ -106,7 +107,7 @@ PackedColumn Pack(std::vector<uint32_t> best, double step) {
     best_cost = cost;
     column.order = order;
   }
-  google::protobuf::Base64Escape(Deflate(Planes(best)), &column.data);
+  column.data = Base64(Deflate(Planes(best)));
   return column;
 }
 

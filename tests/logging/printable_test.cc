@@ -18,6 +18,16 @@ TEST(Printable, PlainUtf8StaysForATerminal) {
   EXPECT_EQ(LinesForTerminal("a\n"), "a\n");
 }
 
+// The vectors of RFC 4648, 10, and bytes with their highest bit.
+TEST(Printable, BytesAreBase64) {
+  const std::string_view all = "foobar";
+  const char* const texts[] = {"", "Zg==", "Zm8=", "Zm9v", "Zm9vYg==", "Zm9vYmE=", "Zm9vYmFy"};
+  for (size_t size = 0; size <= all.size(); ++size) {
+    EXPECT_EQ(Base64(all.substr(0, size)), texts[size]);
+  }
+  EXPECT_EQ(Base64({"\xff\xfe\x00\xfb", 4}), "//4A+w==");
+}
+
 TEST(Printable, TellsPlainUtf8) {
   EXPECT_TRUE(IsPlainUtf8(""));
   EXPECT_TRUE(IsPlainUtf8("\xe2\x80\xa6 \xf0\x9f\x98\x80"));

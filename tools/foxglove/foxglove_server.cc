@@ -1,7 +1,5 @@
 #include "tools/foxglove/foxglove_server.h"
 
-#include <google/protobuf/stubs/strutil.h>
-
 #include <algorithm>
 #include <deque>
 #include <map>
@@ -10,6 +8,7 @@
 #include <utility>
 
 #include "fmt/format.h"
+#include "logging/printable.h"
 #include "tools/run/local_server.h"
 
 namespace poise {
@@ -69,17 +68,13 @@ std::string Advertisement(const std::vector<SceneTopic>& topics) {
   Ordered channels = Ordered::array();
   for (size_t i = 0; i < topics.size(); ++i) {
     const SceneTopic& topic = topics[i];
-    std::string schema = topic.schema_data;
-    if (topic.schema_encoding == "protobuf") {  // bytes, which JSON has not
-      schema.clear();
-      google::protobuf::Base64Escape(topic.schema_data, &schema);
-    }
+    const bool bytes = topic.schema_encoding == "protobuf";  // which JSON has not
     channels.push_back({{"id", i + 1},
                         {"topic", topic.name},
                         {"encoding", topic.encoding},
                         {"schemaName", topic.schema},
                         {"schemaEncoding", topic.schema_encoding},
-                        {"schema", std::move(schema)}});
+                        {"schema", bytes ? logging::Base64(topic.schema_data) : topic.schema_data}});
   }
   return Ordered({{"op", "advertise"}, {"channels", std::move(channels)}}).dump();
 }
