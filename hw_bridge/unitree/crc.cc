@@ -3,6 +3,7 @@
 #include <array>
 #include <bit>
 #include <boost/crc.hpp>
+#include <boost/endian/conversion.hpp>
 #include <cstddef>
 #include <cstring>
 
@@ -36,7 +37,7 @@ static_assert(std::endian::native == std::endian::little,
 uint32_t Crc32(std::span<const uint32_t> words) {
   boost::crc_optimal<32, 0x04C11DB7, 0xFFFFFFFF, 0, false, false> crc;
   for (const uint32_t word : words) {
-    const uint32_t from_the_top = __builtin_bswap32(word);
+    const uint32_t from_the_top = boost::endian::endian_reverse(word);
     crc.process_bytes(&from_the_top, sizeof from_the_top);
   }
   return crc.checksum();
