@@ -116,9 +116,8 @@ RunOutcome ScenarioRun::RunPart(RunSetup* setup, const run_info_t& info, const f
   Progress progress(static_cast<double>(spec.num_ticks() - spec.lead_ticks()) * spec.tick_period(),
                     quiet, static_cast<double>(spec.lead_ticks()) * spec.tick_period());
   if (socket == nullptr) {
-    std::optional<BoundGraph> graph = std::exchange(setup->graph, std::nullopt);
-    if (!graph) graph = ConfigureRun(setup->loaded, &setup->spec);  // after ForgetComponents
-    return RunInline(spec, std::move(*graph), info, dir / "run.lcm", &progress, record);
+    BoundGraph graph = *std::exchange(setup->graph, std::nullopt);
+    return RunInline(spec, std::move(graph), info, dir / "run.lcm", &progress, record);
   }
   return Launcher(spec, *socket, dir, launch, &progress).Run();
 }
@@ -198,11 +197,6 @@ void ScenarioRun::PrintEnd(const logging::RunRecord& record, const RunResult& re
   // A matrix knows none of these changes: beside it this run would be another one.
   const std::string matrix = options_.changes == RunChanges{} ? scenario_ : "";
   fmt::print("{}", FormatNext(main_.loaded.scenario, summary.checks, result.dir, latest, matrix));
-}
-
-void ScenarioRun::ForgetComponents() {
-  main_.graph.reset();
-  if (reference_) reference_->graph.reset();
 }
 
 LogSizes ScenarioRun::log_sizes() const {

@@ -57,9 +57,6 @@ class ScenarioRun {
   /// go into `out`. Throws as Run does.
   RunOutcome RunOnly(const std::string& out);
 
-  /// Lets go of the components, which Run makes again: for one that waits among many.
-  void ForgetComponents();
-
   const RunSpec& spec() const { return main_.spec; }
   const std::string& name() const { return main_.spec.scenario(); }
   const Scenario& scenario() const { return main_.loaded.scenario; }
@@ -68,7 +65,8 @@ class ScenarioRun {
 
  private:
   RunSetup Prepare(RunSetup setup, bool in_process, bool warn) const;
-  /// `dir` has the run's files, and so `info`. Inside this process without a `socket`.
+  /// `dir` has the run's files, and so `info`. Inside this process without a `socket`: by the
+  /// setup's components, once.
   static RunOutcome RunPart(RunSetup* setup, const run_info_t& info,
                             const std::filesystem::path& dir, const RunSocket* socket, bool quiet,
                             const LaunchOptions& launch,

@@ -105,9 +105,7 @@ std::string UniqueName(const std::string& name, std::set<std::string>* taken) {
 bool RunSeveral(const std::vector<std::string>& names, const RunOptions& options,
                 const std::string& out) {
   std::vector<ScenarioRun> runs;
-  for (const std::string& name : ExpandScenarios(names)) {
-    runs.emplace_back(name, options).ForgetComponents();
-  }
+  for (const std::string& name : ExpandScenarios(names)) runs.emplace_back(name, options);
   LogSizes sizes;
   for (const ScenarioRun& run : runs) {
     const LogSizes own = run.log_sizes();
