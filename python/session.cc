@@ -146,6 +146,7 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
   spec_ = MakeRunSpec(loaded, options.changes);
   if (options.endless) spec_.set_num_ticks(0);
   scenario_ = ScenarioText(loaded.scenario);
+  model_ = std::make_shared<robot::RobotModel>(robot::LoadRobotFiles(loaded.robot_file));
   const bool replaces = !options.replaced.empty() || options.plant;
   ComponentRegistry registry;
   if (replaces) Replace(options, &registry);
@@ -168,8 +169,6 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
       foreign_.push_back(foreign);
     }
   }
-  model_ = std::make_shared<robot::RobotModel>(
-      robot::LoadRobotTexts(ResourceOf(spec_, "robot").text(), ResourceOf(spec_, "urdf").text()));
   override_.assign(static_cast<size_t>(model_->num_joints()),
                    std::numeric_limits<double>::quiet_NaN());
   const GraphPlan& plan = runner_->plan();

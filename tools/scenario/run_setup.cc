@@ -326,7 +326,6 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes) {
                                                                            scenario.tick_rate())));
   WriteConfigs(scenario, &spec);
   const robot::RobotFiles robot = robot::ReadRobotFiles(loaded.robot_file);
-  robot.Model();  // whose errors name the file, as those of components do not
   AddResource(&spec, "robot", robot.file, robot.text);
   AddResource(&spec, "urdf", robot.maker_file, robot.maker_text);
   spec.set_realtime(changes.realtime);
@@ -350,8 +349,12 @@ BoundGraph ConfigureRun(const LoadedScenario& loaded, RunSpec* spec) {
   } catch (const GraphError& error) {
     FailGraph(loaded.graph_file, error);
   } catch (const ConfigError& error) {
+    if (error.field().empty()) {
+      // Where the robot is at fault, its error names the file, which the component's does not.
+      robot::LoadRobotFiles(loaded.robot_file);
+      throw;
+    }
     // The component's own field, below the scenario's field of that component.
-    if (error.field().empty()) throw;
     std::string field = error.field();
     for (const ComponentInstance& instance : spec->graph().component()) {
       const std::string& name = instance.name();

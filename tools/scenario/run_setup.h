@@ -18,7 +18,7 @@ namespace poise {
 
 /// Builds the run: a random 63-bit run_id, configurations by component, robot and URDF, versions.
 /// No ports yet. Throws ConfigError, also for a change of another engine's field, or RobotError
-/// when the robot's files cannot work.
+/// when the robot's files cannot be read.
 RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes);
 
 /// The engine that a scenario's field is for, "mujoco" of "mujoco.contact_softness=1e-6"; empty: it
@@ -26,7 +26,8 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes);
 std::string EngineOfField(const std::string& field);
 
 /// Makes and configures every component, checks the graph and fills in the channels' counts.
-/// Throws ConfigError with one line per problem, each with file, line and field.
+/// Throws ConfigError with one line per problem, each with file, line and field, or RobotError when
+/// the robot's files cannot work.
 BoundGraph ConfigureRun(const LoadedScenario& loaded, RunSpec* spec);
 
 /// What the components say is odd about their configurations (Wiring::AddWarning), by the
