@@ -14,14 +14,14 @@ cat >"$work/deploy/setup" <<'SETUP'
 #!/bin/sh
 echo "setup $*"
 program=$(dirname "$0")/../build/release/bin/$2
-printf '#!/bin/sh\necho "%s $*"\nexit '"${ends:-1}"'\n' "$2" >"$program"
+printf '#!/bin/sh\necho "%s $*"\n'"${does:-}"'\nexit '"${ends:-1}"'\n' "$2" >"$program"
 chmod +x "$program"
 [ "$2" != "${fails:-}" ] || exit 7
 SETUP
 chmod +x "$work/deploy/setup"
 
 # Its lines, and its exit code, which is the run's.
-export ends fails
+export does ends fails
 run() { ("$work/deploy/run" "$@" && echo 0 || echo $?) | grep -v -e '^$' -e '^Building' | tr '\n' '|'; }
 expect() { [ "$2" = "$3" ] || fail "$1: $2"; }
 
@@ -36,4 +36,20 @@ expect 'a name that is none' "$(ends=2 run pusch)" 'setup --quiet first_run|firs
 expect 'what else there is cannot be built' "$(fails=poise run push 2>/dev/null)" 'setup --quiet first_run|first_run push|setup --quiet poise|1|'
 rm "$work"/build/release/bin/*
 expect 'nothing can be built' "$(fails=first_run run push)" 'setup --quiet first_run|7|'
-echo 'first_run runs first in a new checkout alone'
+
+# A signal to deploy/run alone ends the run in its own time, and what else there is is not built.
+for signal in TERM INT; do
+  rm -f "$work"/build/release/bin/*
+  : >"$work/out"  # the last signal's is not waited for
+  does='trap "sleep 0.2; echo stopped; kill \$!; exit 0" TERM INT; echo started; sleep 60 & wait' \
+    env --default-signal=INT "$work/deploy/run" push >"$work/out" &
+  until grep -q started "$work/out"; do sleep 0.05; done
+  # Ctrl-C reaches the run from the terminal.
+  [ "$signal" = TERM ] || pkill -INT -P $! -f first_run
+  kill -"$signal" $!
+  code=0
+  wait $! || code=$?
+  expect "SIG$signal" "$code $(tr '\n' '|' <"$work/out")" \
+    "$((128 + $(kill -l $signal))) setup --quiet first_run|first_run push|started|stopped|"
+done
+echo 'first_run runs first in a new checkout alone, and takes its signals'
