@@ -107,6 +107,15 @@ std::optional<Wrench> KnownWrench(const RunRecord& run, size_t foot, int64_t tic
   return KnownWrench(run.robot, FeetOf(run, tick), foot);
 }
 
+bool FeetHaveSensors(const RunRecord& run) {
+  if (std::ranges::none_of(run.robot.feet(), &robot::FootModel::force_sensor)) return false;
+  const auto present = [](int8_t state) { return state != drive_feedback_t::SENSOR_ABSENT; };
+  for (const auto& [tick, sensors] : Messages(run.sensors, 0, run.num_ticks)) {
+    return std::ranges::any_of(sensors->foot_sensor, present);
+  }
+  return true;
+}
+
 std::optional<Wrench> ComputedWrench(const RunRecord& run, size_t foot, int64_t tick) {
   return ComputedWrench({.command = run.command.at(tick)}, foot);
 }

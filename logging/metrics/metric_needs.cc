@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "fmt/format.h"
+#include "logging/metrics/analysis.h"
 #include "logging/metrics/schedule_plan.h"
 #include "logging/metrics/walk_course.h"
 
@@ -223,8 +224,7 @@ bool Has(const RunRecord& run, std::string_view what) {
   if (channel == "JOINT_COMMAND") return CommandTells(run, field);
   if (field != "foot_wrench") return true;
   if (channel == "ROBOT_STATE") return ObservesFeet(run);
-  return channel != "ROBOT_SENSORS" ||
-         std::ranges::any_of(run.robot.feet(), &robot::FootModel::force_sensor);
+  return channel != "ROBOT_SENSORS" || FeetHaveSensors(run);
 }
 
 }  // namespace

@@ -2,9 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "poise/drive_feedback_t.hpp"
 #include "tests/logging/record_fixture.h"
 #include "tools/report/report.h"
 #include "tools/report/run_screen.h"
@@ -52,6 +54,17 @@ class UnknownChecksTest : public logging::RecordTest {
 
   Scenario scenario_;
 };
+
+TEST_F(UnknownChecksTest, FeetWhoseSensorsAreAbsentAreObserved) {
+  Limit("cop_measured_max_x", 10);
+  EXPECT_EQ(Evaluate().back().label, "the cop_measured_max_x");
+  for (robot_sensors_t& sensors : sensors_) {
+    std::ranges::fill(sensors.foot_sensor, drive_feedback_t::SENSOR_ABSENT);
+  }
+  const CheckResult check = Evaluate().back();
+  EXPECT_THAT(check.label, HasSubstr("observed"));
+  EXPECT_EQ(check.missing.front(), "ROBOT_SENSORS.foot_wrench or ROBOT_STATE.foot_wrench");
+}
 
 TEST_F(UnknownChecksTest, TheyPassNothingAndFailNothing) {
   const std::vector<CheckResult> checks = Evaluate();

@@ -7,6 +7,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_path.h"
 #include "fmt/format.h"
+#include "logging/metrics/analysis.h"
 #include "logging/metrics/metric_needs.h"
 #include "logging/metrics/metrics.h"
 #include "logging/recording/inline_recorder.h"
@@ -29,8 +30,7 @@ void Evaluate(const logging::Metric& metric, const logging::RunRecord& run, Chec
   result->unit = metric.unit;
   if (result->label.empty()) result->label = metric.description;
   result->measured = metric.compute(run);
-  const bool sensed = std::ranges::any_of(run.robot.feet(), &robot::FootModel::force_sensor);
-  if (metric.name.starts_with("cop_measured") && !sensed) {
+  if (metric.name.starts_with("cop_measured") && !logging::FeetHaveSensors(run)) {
     result->label += " (observed: the feet have no sensors)";
   }
   if (!result->measured) result->missing = logging::MissingFor(metric, run);
