@@ -76,11 +76,6 @@ class FirstError final : public google::protobuf::io::ErrorCollector {
 
 }  // namespace
 
-ConfigError::ConfigError(std::string_view field, std::string_view problem)
-    : std::runtime_error(std::string(field).append(": ").append(problem)),
-      field_(field),
-      problem_(problem) {}
-
 void ParseTextProto(std::string_view text, std::string_view source,
                     google::protobuf::Message* message,
                     bool (*passes_over)(std::string_view complaint)) {
