@@ -14,8 +14,6 @@ namespace {
 
 using robot::Foot;
 
-std::string Field(int phase) { return fmt::format("phase[{}]", phase); }
-
 size_t Slot(Outcome outcome, Foot foot) {
   switch (outcome) {
     case DONE:
@@ -37,8 +35,8 @@ std::map<std::string, int> ReadNames(const StepPlannerConfig& config) {
     if (name.empty()) continue;
     const auto [other, fresh] = index.emplace(name, i);
     if (!fresh) {
-      throw ConfigError(Field(i) + ".name",
-                        fmt::format("'{}' is the name of {}, too", name, Field(other->second)));
+      throw ConfigError(PhaseField(i) + ".name", fmt::format("'{}' is the name of {}, too", name,
+                                                             PhaseField(other->second)));
     }
   }
   return index;
@@ -58,6 +56,8 @@ int FindPhase(const StepPlannerConfig& config, const std::map<std::string, int>&
 }
 
 }  // namespace
+
+std::string PhaseField(int phase) { return fmt::format("phase[{}]", phase); }
 
 robot::FootArray<bool> ContactsOf(Support support) { return {support != LEFT, support != RIGHT}; }
 
@@ -82,7 +82,7 @@ void PhaseGraph::AddArrows(const StepPlannerConfig& config, int phase) {
   const auto add = [&](Outcome outcome, Foot foot, int to, int next) {
     int& follower = followers[Slot(outcome, foot)];
     if (follower != kNone) {
-      throw ConfigError(fmt::format("{}.next[{}].on", Field(phase), next),
+      throw ConfigError(fmt::format("{}.next[{}].on", PhaseField(phase), next),
                         fmt::format("names {} a second time", Outcome_Name(outcome)));
     }
     follower = to;
@@ -90,10 +90,10 @@ void PhaseGraph::AddArrows(const StepPlannerConfig& config, int phase) {
   };
   for (int k = 0; k < from.next_size(); ++k) {
     const NextPhase& next = from.next(k);
-    const std::string field = fmt::format("{}.next[{}]", Field(phase), k);
+    const std::string field = fmt::format("{}.next[{}]", PhaseField(phase), k);
     const int to = FindPhase(config, names, next.to(), field + ".to");
     if (next.on() == DONE && !from.has_duration()) {
-      throw ConfigError(Field(phase) + ".duration",
+      throw ConfigError(PhaseField(phase) + ".duration",
                         "is missing; without one the phase is never DONE");
     }
     if (next.on() != CONTACT_LOST) {
@@ -107,7 +107,7 @@ void PhaseGraph::AddArrows(const StepPlannerConfig& config, int phase) {
   }
   if (!from.has_duration() || followers[Slot(DONE, Foot::kRight)] != kNone) return;
   if (phase + 1 == size()) {
-    throw ConfigError(Field(phase) + ".duration",
+    throw ConfigError(PhaseField(phase) + ".duration",
                       "has no phase after it; remove it, or give next { on: DONE to: ... }");
   }
   add(DONE, Foot::kRight, phase + 1, kNone);
@@ -130,8 +130,9 @@ void PhaseGraph::CheckReached(const StepPlannerConfig& config) const {
   if (lost == reached.end()) return;
   const auto i = static_cast<int>(lost - reached.begin());
   const bool ends = config.phase(i - 1).has_duration();
-  throw ConfigError(Field(i), fmt::format("is never reached: {}",
-                                          ends ? "no phase leads to it"
+  throw ConfigError(
+      PhaseField(i),
+      fmt::format("is never reached: {}", ends ? "no phase leads to it"
                                                : fmt::format("the phase before it, '{}', has no "
                                                              "duration, and no other leads to it",
                                                              config.phase(i - 1).name())));
@@ -146,7 +147,7 @@ void PhaseGraph::CheckLoops(const StepPlannerConfig& config) const {
       at = to;
       if (at == first) {
         throw ConfigError(
-            Field(first) + ".duration",
+            PhaseField(first) + ".duration",
             "is 0 in a loop of phases that take no time; give one of them a duration");
       }
     }

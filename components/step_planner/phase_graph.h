@@ -2,12 +2,16 @@
 #pragma once
 
 #include <array>
+#include <string>
 #include <vector>
 
 #include "components/robot/foot.h"
 #include "components/step_planner/step_planner.pb.h"
 
 namespace poise {
+
+/// Where a phase stands in the configuration: "phase[1]".
+std::string PhaseField(int phase);
 
 /// Feet in contact.
 robot::FootArray<bool> ContactsOf(Support support);

@@ -21,7 +21,6 @@ using robot::Foot;
 
 const char* Name(Foot foot) { return foot == Foot::kRight ? "right" : "left"; }
 Support SupportOn(Foot foot) { return foot == Foot::kRight ? RIGHT : LEFT; }
-std::string Field(int phase) { return fmt::format("phase[{}]", phase); }
 
 void CheckTurn(const Turn& turn, const std::string& field) {
   const double angle = Eigen::Vector3d(turn.x(), turn.y(), turn.z()).norm();
@@ -63,7 +62,7 @@ void CheckRamp(const Phase& phase, const std::string& field) {
 
 /// What lies before and behind a phase's ramp.
 void CheckTransition(const StepPlannerConfig& config, const PhaseGraph& graph, int index) {
-  const std::string field = Field(index) + ".transition";
+  const std::string field = PhaseField(index) + ".transition";
   const ContactTransition& transition = config.phase(index).transition();
   const Foot foot = robot::FootAt(transition.foot());
   const Support single = SupportOn(Other(foot));
@@ -100,7 +99,7 @@ bool Waits(const StepPlannerConfig& config, const PhaseGraph& graph, int index) 
 void CheckTimeout(const StepPlannerConfig& config, const PhaseGraph& graph, int index) {
   const Phase& phase = config.phase(index);
   const bool follows = graph.Follower(index, TIMEOUT) != PhaseGraph::kNone;
-  const std::string field = Field(index) + ".timeout";
+  const std::string field = PhaseField(index) + ".timeout";
   if (!phase.has_timeout()) {
     if (follows) throw ConfigError(field, "is missing; give the s that the phase may be held back");
     return;
@@ -115,15 +114,15 @@ void CheckTimeout(const StepPlannerConfig& config, const PhaseGraph& graph, int 
 void CheckArrow(const StepPlannerConfig& config, const PhaseGraph& graph,
                 const PhaseGraph::Arrow& arrow) {
   const Phase &from = config.phase(arrow.from), &to = config.phase(arrow.to);
-  const std::string next = fmt::format("{}.next[{}]", Field(arrow.from), arrow.next);
+  const std::string next = fmt::format("{}.next[{}]", PhaseField(arrow.from), arrow.next);
   const bool listed = arrow.next == PhaseGraph::kNone;
   if (from.support() != DOUBLE && to.support() != DOUBLE && from.support() != to.support()) {
-    throw ConfigError(listed ? Field(arrow.to) + ".support" : next + ".to",
+    throw ConfigError(listed ? PhaseField(arrow.to) + ".support" : next + ".to",
                       "exchanges the stance foot at once; put a DOUBLE phase between");
   }
   if (from.support() != DOUBLE && to.support() == DOUBLE) {
     if (from.gravity_compensation()) {
-      throw ConfigError(Field(arrow.from) + ".gravity_compensation",
+      throw ConfigError(PhaseField(arrow.from) + ".gravity_compensation",
                         "lowers no foot, but the next phase waits for one to touch down; put a "
                         "phase with tasks between");
     }
@@ -185,12 +184,12 @@ void CheckStepPlannerConfig(const StepPlannerConfig& config) {
   for (int i = 0; i < config.phase_size(); ++i) {
     const Phase& phase = config.phase(i);
     if (phase.gravity_compensation() && (phase.has_com() || phase.has_foot() || phase.has_body())) {
-      throw ConfigError(Field(i) + ".gravity_compensation",
+      throw ConfigError(PhaseField(i) + ".gravity_compensation",
                         "has no task; remove the phase's com, foot and body references");
     }
-    if (phase.has_body()) CheckTurn(phase.body(), Field(i) + ".body");
-    if (phase.has_foot()) CheckFoot(phase, Field(i) + ".foot");
-    if (phase.has_transition()) CheckRamp(phase, Field(i) + ".transition");
+    if (phase.has_body()) CheckTurn(phase.body(), PhaseField(i) + ".body");
+    if (phase.has_foot()) CheckFoot(phase, PhaseField(i) + ".foot");
+    if (phase.has_transition()) CheckRamp(phase, PhaseField(i) + ".transition");
   }
   const PhaseGraph graph(config);
   for (const PhaseGraph::Arrow& arrow : graph.arrows()) CheckArrow(config, graph, arrow);

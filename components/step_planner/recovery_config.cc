@@ -40,16 +40,14 @@ constexpr double kLeastSwingEffort = 0.35, kMostSwingEffort = 0.9;
 constexpr double kSpeedError = 0.11;
 // s of the ramp (61) before a foot leaves the ground, and s in the air at least. On a point mass
 // shorter ones catch no more (docs/lab/steps/2026-11-28-level-feet.md).
-constexpr double kUnload = 0.02, kLeastSwing = 0.12;
-constexpr double kGap = 0.02;          // m between the soles, sideways
-constexpr double kComLowering = 0.06;  // m by which longer steps lower the COM at most
-// rad off the joints' limits at footholds: as far as a leg's joint overshoots.
-constexpr double kFootholdJointMargin = 0.1;
+constexpr double kPushUnload = 0.02, kLeastSwing = 0.12;
+constexpr double kGap = 0.02;               // m between the soles, sideways
+constexpr double kLongStepLowering = 0.06;  // m by which longer steps lower the COM at most
 // Share of the weight that an observed load must be above to be a landing: a leg that brakes its
 // swing was seen to be misjudged by 0.05, by more than three standard deviations.
 constexpr double kObservedLoad = 0.15;
 
-constexpr double kMostTurn = 0.5;  // rad in a step: a hip turns by as much
+constexpr double kMostStepTurn = 0.5;  // rad in a step: a hip turns by as much
 // Share of the standing height by which the COM walks lower, so that knees can give. Fitted: with
 // none iCub and heron fall as they step in place, with 0.09 iCub does.
 constexpr double kWalkLowering = 0.06;
@@ -123,13 +121,15 @@ stepping::StepChoice MakeStepChoice(const robot::RobotModel& model) {
                                   kSoleMargin, foot.name, foot.length, foot.width));
   }
   const double height = robot::StandingHeight(model);
-  const stepping::Reach reach(model, height, kComLowering, kFootholdJointMargin, kGap);
+  const stepping::Reach reach(model, height, kLongStepLowering, stepping::Reach::kJointReserve,
+                              kGap);
   if (reach.empty()) {
-    throw ConfigError("recovery",
-                      fmt::format("lowers the COM by {} m; robot '{}' cannot stand so much lower "
-                                  "than {} m with its joints {} rad off their limits: its file's "
-                                  "stance or limits leave no room to step",
-                                  kComLowering, model.name(), height, kFootholdJointMargin));
+    throw ConfigError(
+        "recovery",
+        fmt::format("lowers the COM by {} m; robot '{}' cannot stand so much lower "
+                    "than {} m with its joints {} rad off their limits: its file's "
+                    "stance or limits leave no room to step",
+                    kLongStepLowering, model.name(), height, stepping::Reach::kJointReserve));
   }
   stepping::StepLimits limits;
   limits.sole_margin = kSoleMargin;
@@ -139,13 +139,13 @@ stepping::StepChoice MakeStepChoice(const robot::RobotModel& model) {
   const double full = SwingAcceleration(model);
   limits.acceleration = std::clamp(followed, kLeastSwingEffort * full, kMostSwingEffort * full);
   limits.least_swing = kLeastSwing;
-  limits.unload = kUnload;
+  limits.unload = kPushUnload;
   limits.overshoot = kOvershoot;
   limits.ample_margin = kAmpleMargin;
   limits.spacing = std::max(robot::StandingSpacing(model), reach.least_spacing());
   limits.longest = LongestStride(reach, limits.spacing);
   limits.widest = std::max(0.0, WidestStance(reach) - limits.spacing);
-  limits.most_turn = kMostTurn;
+  limits.most_turn = kMostStepTurn;
   limits.leg_distance = std::max(std::max(model.feet()[0].width, model.feet()[1].width),
                                  kLegShare * stepping::Legs(model).hip_spacing());
   return {model, reach, limits};
@@ -165,7 +165,7 @@ stepping::RecoverySpec MakeRecoverySpec(const RecoveryConfig& config,
   spec.turn_share = TurningInertia(model) / (model.total_mass() * robot::kGravity);
   spec.watched_margin = watched_margin;
   spec.walk_lowering = MostLowering(model, kWalkLowering * robot::StandingHeight(model));
-  spec.holding_lowering = MostLowering(model, kComLowering);
+  spec.holding_lowering = MostLowering(model, kLongStepLowering);
   return spec;
 }
 

@@ -72,10 +72,8 @@ constexpr double kTouchSpeed = 0.1;   // m/s downward: a foot that meets the gro
 constexpr double kStillSpeed = 0.04;  // m/s of the COM, as kStillDistance in an ω
 constexpr double kYawRate = 5;        // 1/s with which the body's heading follows the feet's
 constexpr double kTurnAcceleration = 0.2;  // rad/s² with which the turn rate is approached
-// Not scaled: joints keep off their limits by an angle, and a hard sole bounces as long on any
-// robot.
-constexpr double kFootholdJointMargin = 0.1;  // rad off the joints' limits at footholds
-constexpr double kTouchDuration = 0.002;      // s of contact.touch_load that are a landing
+// Not scaled: a hard sole bounces as long on any robot.
+constexpr double kTouchDuration = 0.002;  // s of contact.touch_load that are a landing
 // s, time constant with which a foot that has touched is let go in the ground's plane.
 constexpr double kRelaxTime = 0.015;
 
@@ -196,19 +194,21 @@ void CheckWalkConfig(const WalkConfig& config) {
 stepping::StepChoice MakeWalkChoice(const WalkConfig& config, const robot::RobotModel& model) {
   const double height = robot::StandingHeight(model);
   const double lowering = RobotScale(model).Length(kReachLowering);
-  const stepping::Reach reach(model, height, lowering, kFootholdJointMargin, config.gap());
+  const stepping::Reach reach(model, height, lowering, stepping::Reach::kJointReserve,
+                              config.gap());
   if (reach.empty()) {
     throw ConfigError(
         "walk", fmt::format("robot '{}', whose COM stands {:.3f} m high, cannot stand {:.3f} m "
                             "lower with {} rad between its joints and their limits: its file's "
                             "stance or limits leave no room to walk",
-                            model.name(), height, lowering, kFootholdJointMargin));
+                            model.name(), height, lowering, stepping::Reach::kJointReserve));
   }
   stepping::StepLimits limits;
   limits.sole_margin = kSoleMarginShare * LeastInnerRadius(model);
   limits.spacing = std::max(robot::StandingSpacing(model), reach.least_spacing());
   CheckLegs(config, model, reach, limits.spacing);
-  CheckStanceLegs(LiftOffDistance(model, limits), model, reach, height, kFootholdJointMargin);
+  CheckStanceLegs(LiftOffDistance(model, limits), model, reach, height,
+                  stepping::Reach::kJointReserve);
   return {model, reach, limits};
 }
 

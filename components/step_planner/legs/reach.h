@@ -22,6 +22,9 @@ enum class Crossing { kNone, kInFront, kBehind };
 /// ahead, y to the left, m.
 class Reach {
  public:
+  /// rad off the joints' limits at footholds: as far as a leg's joint overshoots.
+  static constexpr double kJointReserve = 0.1;
+
   /// Nothing is reached.
   Reach() = default;
   /// At two heights of the COM above the soles: standing, and `lowering` m below. A leg's joints
