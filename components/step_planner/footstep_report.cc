@@ -14,7 +14,6 @@ namespace {
 using robot::Foot;
 using robot::Other;
 using stepping::QuasiStaticWalk;
-using stepping::Stage;
 using Report = ::steps::footsteps_t;
 
 constexpr int kCorners = stepping::kRegionDirections;
@@ -29,7 +28,7 @@ static_assert(sizeof(Report::region_x) / sizeof(double) ==
 std::optional<Foot> Stance(const FootstepInput& input, const stepping::Recovery* recovery,
                            const QuasiStaticWalk* walk) {
   if (walk != nullptr && walk->active()) {
-    if (walk->stage() == Stage::kCatching) return {};
+    if (walk->stage() == stepping::Stage::kCatching) return {};
     return Other(walk->stepping_foot());
   }
   if (recovery != nullptr && !recovery->steps().empty()) {
@@ -100,7 +99,7 @@ void FootstepReport::Update(const FootstepInput& input, const stepping::Recovery
     seen.foothold = {out->x[0], out->y[0]};
     seen.time_left = out->touch_down[0];
     // A walk is counted on where it is planned.
-    if (!walks && recovery->stage() == Stage::kSwinging) {
+    if (!walks && recovery->stage() == stepping::Stage::kSwinging) {
       const double metre = stepping::LeastSwingTime(1, recovery->choice().limits().acceleration);
       seen.movable = seen.time_left * seen.time_left / (metre * metre);
     }
