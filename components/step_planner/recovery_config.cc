@@ -121,8 +121,7 @@ stepping::StepChoice MakeStepChoice(const robot::RobotModel& model) {
                                   kSoleMargin, foot.name, foot.length, foot.width));
   }
   const double height = robot::StandingHeight(model);
-  const stepping::Reach reach(model, height, kLongStepLowering, stepping::Reach::kJointReserve,
-                              kGap);
+  const stepping::Reach reach(model, height, kLongStepLowering, kGap);
   if (reach.empty()) {
     throw ConfigError(
         "recovery",

@@ -194,8 +194,7 @@ void CheckWalkConfig(const WalkConfig& config) {
 stepping::StepChoice MakeWalkChoice(const WalkConfig& config, const robot::RobotModel& model) {
   const double height = robot::StandingHeight(model);
   const double lowering = RobotScale(model).Length(kReachLowering);
-  const stepping::Reach reach(model, height, lowering, stepping::Reach::kJointReserve,
-                              config.gap());
+  const stepping::Reach reach(model, height, lowering, config.gap());
   if (reach.empty()) {
     throw ConfigError(
         "walk", fmt::format("robot '{}', whose COM stands {:.3f} m high, cannot stand {:.3f} m "
@@ -207,8 +206,7 @@ stepping::StepChoice MakeWalkChoice(const WalkConfig& config, const robot::Robot
   limits.sole_margin = kSoleMarginShare * LeastInnerRadius(model);
   limits.spacing = std::max(robot::StandingSpacing(model), reach.least_spacing());
   CheckLegs(config, model, reach, limits.spacing);
-  CheckStanceLegs(LiftOffDistance(model, limits), model, reach, height,
-                  stepping::Reach::kJointReserve);
+  CheckStanceLegs(LiftOffDistance(model, limits), model, reach, height);
   return {model, reach, limits};
 }
 

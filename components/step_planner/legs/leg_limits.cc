@@ -148,12 +148,12 @@ void CheckGap(double gap, const robot::RobotModel& model, const stepping::Reach&
 }
 
 void CheckStanceLegs(double distance, const robot::RobotModel& model, const stepping::Reach& reach,
-                     double height, double reserve) {
+                     double height) {
   double beside = 0;
   for (const robot::Foot foot : robot::kFeet) beside = std::max(beside, reach.BesideCom(foot));
   if (beside <= distance) return;
   std::string joints;
-  for (const stepping::JointAt& at : stepping::JointsBelowCom(model, height, reserve)) {
+  for (const stepping::JointAt& at : stepping::JointsBelowCom(model, height)) {
     const robot::Joint& joint = model.joints()[static_cast<size_t>(at.joint)];
     joints +=
         fmt::format("{}{} would be at {:.3f} of {:.3f} to {:.3f} rad", joints.empty() ? "" : ", ",
@@ -166,7 +166,8 @@ void CheckStanceLegs(double distance, const robot::RobotModel& model, const step
                   "{} rad are kept off each limit. Give false: it walks as on level ground then, "
                   "and unknown "
                   "ground is not for it",
-                  model.name(), beside, distance, joints.empty() ? "" : ": ", joints, reserve));
+                  model.name(), beside, distance, joints.empty() ? "" : ": ", joints,
+                  stepping::Reach::kJointReserve));
 }
 
 void CheckClearance(double clearance, const robot::RobotModel& model) {

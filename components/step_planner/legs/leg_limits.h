@@ -22,10 +22,9 @@ double MostLowering(const robot::RobotModel& model, double wanted);
 /// `reach`: with that gap.
 void CheckGap(double gap, const robot::RobotModel& model, const stepping::Reach& reach);
 /// Throws ConfigError "walk.quasi_static" with the joints that keep either sole from standing
-/// within `distance` m of right below the COM. `reach`: at `height` m, `reserve` rad off the
-/// joints' limits.
+/// within `distance` m of right below the COM. `reach`: at `height` m.
 void CheckStanceLegs(double distance, const robot::RobotModel& model, const stepping::Reach& reach,
-                     double height, double reserve);
+                     double height);
 /// `clearance`: m by which either foot is raised, the COM as high as standing.
 void CheckClearance(double clearance, const robot::RobotModel& model);
 

@@ -31,11 +31,10 @@ constexpr double kMaxTurn = 0.3;  // rad, of a joint in one iteration
 /// One leg by Newton's method; body and other leg stay.
 class Leg {
  public:
-  Leg(const robot::RobotModel& model, const robot::RobotState& standing, Foot foot, double reserve)
+  Leg(const robot::RobotModel& model, const robot::RobotState& standing, Foot foot)
       : model_(model), data_(model), state_(standing), foot_(foot) {
     const auto joints = model.supporting_joints(model.feet()[foot_].body);
     joints_.assign(joints.begin(), joints.end());
-    reserve_ = reserve;
     Evaluate();
     level_ = data_.foot_pose[foot_].linear();
   }
@@ -104,7 +103,7 @@ class Leg {
   bool Within(int j) const {
     const robot::Joint& joint = model_.joints()[static_cast<size_t>(j)];
     const double q = state_.joint_position[j];
-    return q >= joint.lower + reserve_ && q <= joint.upper - reserve_;
+    return q >= joint.lower + Reach::kJointReserve && q <= joint.upper - Reach::kJointReserve;
   }
   bool WithinLimits() const {
     return std::ranges::all_of(joints_, [&](int j) { return Within(j); });
@@ -115,7 +114,6 @@ class Leg {
   robot::RobotState state_;
   Foot foot_;
   std::vector<int> joints_;
-  double reserve_ = 0;
   Eigen::Matrix3d level_;
 };
 
@@ -132,15 +130,14 @@ std::optional<robot::RobotState> Standing(const robot::RobotModel& model, double
 
 /// Returns where `foot` reaches from the COM, from the stance outwards; empty when the stance
 /// cannot be held.
-balance::ConvexPolygon LegPolygon(const robot::RobotModel& model, double height, Foot foot,
-                                  double reserve) {
+balance::ConvexPolygon LegPolygon(const robot::RobotModel& model, double height, Foot foot) {
   const std::optional<robot::RobotState> standing = Standing(model, height);
   if (!standing) return {};
   std::array<Vector2d, kDirections> edge;
   for (int i = 0; i < kDirections; ++i) {
     const double angle = 2 * std::numbers::pi * i / kDirections;
     const Vector3d direction(std::cos(angle), std::sin(angle), 0);
-    Leg leg(model, *standing, foot, reserve);
+    Leg leg(model, *standing, foot);
     const Vector3d start = leg.sole();
     double reached = 0, stride = kOmegaStepTime;
     while (stride > kFinest && reached < kFarthest) {
@@ -179,13 +176,12 @@ balance::ConvexPolygon HullOf(const balance::ConvexPolygon& a, const balance::Co
   return balance::ConvexHull({points.data(), count});
 }
 
-Reach::Reach(const robot::RobotModel& model, double height, double lowering, double joint_reserve,
-             double gap)
+Reach::Reach(const robot::RobotModel& model, double height, double lowering, double gap)
     : lowering_(lowering) {
   for (const Foot foot : kFeet) {
     auto& leg = leg_[foot];
-    leg[0] = LegPolygon(model, height, foot, joint_reserve);
-    leg[1] = LegPolygon(model, height - lowering, foot, joint_reserve);
+    leg[0] = LegPolygon(model, height, foot);
+    leg[1] = LegPolygon(model, height - lowering, foot);
   }
   least_spacing_ = 0.5 * (model.feet()[0].width + model.feet()[1].width) + gap;
   double front = 0, rear = 0;
@@ -251,12 +247,12 @@ balance::ConvexPolygon Reach::Footholds(Foot foot, const Vector2d& com, Crossing
   return balance::Clip(reached, {{0, -side}, -least_spacing_});
 }
 
-std::vector<JointAt> JointsBelowCom(const robot::RobotModel& model, double height, double reserve) {
+std::vector<JointAt> JointsBelowCom(const robot::RobotModel& model, double height) {
   std::vector<JointAt> joints;
   const std::optional<robot::RobotState> standing = Standing(model, height);
   if (!standing) return joints;
   for (const Foot foot : kFeet) {
-    Leg leg(model, *standing, foot, reserve);
+    Leg leg(model, *standing, foot);
     const Vector3d com = leg.Com();
     const std::vector<JointAt> near = leg.NearLimits({com.x(), com.y(), leg.sole().z()});
     joints.insert(joints.end(), near.begin(), near.end());

@@ -28,10 +28,9 @@ class Reach {
   /// Nothing is reached.
   Reach() = default;
   /// At two heights of the COM above the soles: standing, and `lowering` m below. A leg's joints
-  /// keep `joint_reserve`, rad, off their limits, and a straight knee as far off. `gap`, m: between
-  /// the soles, sideways. Never throws; a robot that cannot stand there has no reach.
-  Reach(const robot::RobotModel& model, double height, double lowering, double joint_reserve,
-        double gap);
+  /// keep `kJointReserve` off their limits, and a straight knee as far off. `gap`, m: between the
+  /// soles, sideways. Never throws; a robot that cannot stand there has no reach.
+  Reach(const robot::RobotModel& model, double height, double lowering, double gap);
 
   bool empty() const {
     for (const auto& leg : leg_) {
@@ -74,9 +73,9 @@ struct JointAt {
   int joint = 0;
   double position = 0;  ///< rad
 };
-/// The joints of the legs that come nearer than `reserve`, rad, to a limit, or beyond it, where a
+/// The joints of the legs that come nearer than `kJointReserve` to a limit, or beyond it, where a
 /// leg stands with its level sole right below the COM, `height` m above it, the body as it stands.
 /// Empty as well where the robot does not stand so high.
-std::vector<JointAt> JointsBelowCom(const robot::RobotModel& model, double height, double reserve);
+std::vector<JointAt> JointsBelowCom(const robot::RobotModel& model, double height);
 
 }  // namespace poise::stepping

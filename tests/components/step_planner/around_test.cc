@@ -171,7 +171,7 @@ double Between(const robot::FootModel& a, const Vector2d& at_a, const robot::Foo
 
 // On the right foot, pushed anywhere: no foothold and no way to it upon the standing sole or leg.
 TEST_P(AroundCase, NoSoleOrLegMeetsTheOther) {
-  const Reach reach(model_, height_, 0.03, 0.1, gap_);
+  const Reach reach(model_, height_, 0.03, gap_);
   StepLimits limits{.sole_margin = 0.01,
                     .acceleration = 60,
                     .least_swing = 0.2,

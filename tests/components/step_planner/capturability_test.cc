@@ -25,7 +25,7 @@ constexpr double kEdge = 0.02;  // m
 
 StepChoice Choice() {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
-  const Reach reach(model, robot::StandingHeight(model), 0.05, 0.1, 0.02);
+  const Reach reach(model, robot::StandingHeight(model), 0.05, 0.02);
   StepLimits limits;
   limits.sole_margin = kEdge;
   limits.acceleration = 20;

@@ -348,7 +348,7 @@ TEST_P(RecoveryCase, APushWhileTheFeetComeTogetherJumpsNoLoad) {
   // Shorter steps than those of a COM that goes down as far as it ships: with feet farther apart
   // than they leave them hardly a push is caught on the way, by whatever foot.
   const robot::RobotModel model = robot::LoadTestRobot(GetParam());
-  const StepChoice lower(model, Reach(model, robot::StandingHeight(model), 0.03, 0.1, 0.02),
+  const StepChoice lower(model, Reach(model, robot::StandingHeight(model), 0.03, 0.02),
                          MakeStepChoice(model).limits());
   int hurried = 0, stood = 0;
   for (const double unloaded : {0.1, 0.5, 0.9}) {

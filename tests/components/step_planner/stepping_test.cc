@@ -193,7 +193,7 @@ class ReachCase : public testing::TestWithParam<TestRobot> {
 
 // The posture solver, which knows nothing of the polygons, stands where they say.
 TEST_P(ReachCase, APostureExistsWhereverTheyReach) {
-  const Reach reach(model_, height_, lower_, 0.1, 0.02);
+  const Reach reach(model_, height_, lower_, 0.02);
   ASSERT_FALSE(reach.empty());
   std::mt19937 random{TestSeed(163)};
   std::uniform_real_distribution<double> any(-1, 1);
@@ -226,7 +226,7 @@ TEST_P(ReachCase, APostureExistsWhereverTheyReach) {
 }
 
 TEST_P(ReachCase, FootholdsAreBesideTheOtherSole) {
-  const Reach reach(model_, height_, lower_, 0.1, 0.02);
+  const Reach reach(model_, height_, lower_, 0.02);
   for (const Foot foot : kFeet) {
     const balance::ConvexPolygon footholds = reach.Footholds(foot, {0.05, 0});
     ASSERT_GE(footholds.num_corners, 3);
@@ -240,7 +240,7 @@ TEST_P(ReachCase, FootholdsAreBesideTheOtherSole) {
 // inside, the chosen one is within 2 cm of holding it.
 TEST_P(ReachCase, NoFootholdIsMuchBetterThanTheChosen) {
   const double spacing = robot::StandingSpacing(model_);
-  const Reach reach(model_, height_, lower_, 0.1, 0.02);
+  const Reach reach(model_, height_, lower_, 0.02);
   StepLimits limits{.sole_margin = 0.01,
                     .acceleration = 25,
                     .least_swing = 0.2,
@@ -308,7 +308,7 @@ double BeyondSpan(const Reach& reach, Foot foot, const Vector2d& foothold) {
 
 // However fast the robot falls: the prediction runs away as e^ωT, the foothold does not.
 TEST_P(ReachCase, NoFootholdIsBeyondWhatBothLegsSpan) {
-  const Reach reach(model_, height_, lower_, 0.1, 0.02);
+  const Reach reach(model_, height_, lower_, 0.02);
   const StepLimits limits{.sole_margin = 0.01,
                           .acceleration = 25,
                           .least_swing = 0.2,
