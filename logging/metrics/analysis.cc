@@ -110,10 +110,9 @@ std::optional<Wrench> KnownWrench(const RunRecord& run, size_t foot, int64_t tic
 bool FeetHaveSensors(const RunRecord& run) {
   if (std::ranges::none_of(run.robot.feet(), &robot::FootModel::force_sensor)) return false;
   const auto present = [](int8_t state) { return state != drive_feedback_t::SENSOR_ABSENT; };
-  for (const auto& [tick, sensors] : Messages(run.sensors, 0, run.num_ticks)) {
-    return std::ranges::any_of(sensors->foot_sensor, present);
-  }
-  return true;
+  auto readings = Messages(run.sensors, 0, run.num_ticks);
+  const auto first = readings.begin();
+  return first == readings.end() || std::ranges::any_of((*first).second->foot_sensor, present);
 }
 
 std::optional<Wrench> ComputedWrench(const RunRecord& run, size_t foot, int64_t tick) {

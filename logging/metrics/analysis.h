@@ -82,8 +82,8 @@ std::optional<Wrench> ComputedWrench(const RunRecord& run, size_t foot, int64_t 
 std::optional<Wrench> KnownWrench(const RunRecord& run, size_t foot, int64_t tick);
 Answer MotorTorque(const RunRecord& run, size_t joint, int64_t tick);
 
-/// Whether any foot has a sensor that the run reads, good or not: the robot's text gives it one, and
-/// no message says that it is absent. Feet without are observed.
+/// Whether any foot has a sensor that the run reads, good or not: the robot's text gives it one,
+/// and the run's first message does not say that it is absent. Feet without are observed.
 bool FeetHaveSensors(const RunRecord& run);
 
 /// Reading at `tick` less the wrench computed for it (the tick before), robot on environment, sole
