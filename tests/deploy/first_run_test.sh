@@ -37,16 +37,15 @@ expect 'what else there is cannot be built' "$(fails=poise run push 2>/dev/null)
 rm "$work"/build/release/bin/*
 expect 'nothing can be built' "$(fails=first_run run push)" 'setup --quiet first_run|7|'
 
-# A signal to deploy/run alone ends the run in its own time, and what else there is is not built.
+# A signal ends the run in its own time, and what else there is is not built. SIGTERM comes to deploy/run alone; Ctrl-C to
+# it and the run, as to all of a terminal's foreground group.
 for signal in TERM INT; do
   rm -f "$work"/build/release/bin/*
   : >"$work/out"  # the last signal's is not waited for
   does='trap "sleep 0.2; echo stopped; kill \$!; exit 0" TERM INT; echo started; sleep 60 & wait' \
-    env --default-signal=INT "$work/deploy/run" push >"$work/out" &
+    setsid env --default-signal=INT "$work/deploy/run" push >"$work/out" &
   until grep -q started "$work/out"; do sleep 0.05; done
-  # Ctrl-C reaches the run from the terminal.
-  [ "$signal" = TERM ] || pkill -INT -P $! -f first_run
-  kill -"$signal" $!
+  [ "$signal" = TERM ] && kill -TERM $! || kill -INT -- -$!
   code=0
   wait $! || code=$?
   expect "SIG$signal" "$code $(tr '\n' '|' <"$work/out")" \
