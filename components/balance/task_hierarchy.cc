@@ -110,10 +110,10 @@ bool TaskHierarchy::AddLevel(Index first_row, Index t, const MatrixRef& jacobian
   auto u = reduced_.head(rank_);
   contact_->ReduceRows(jacobian.middleRows(first_row, t), bias_acceleration.segment(first_row, t),
                        rows_.topLeftCorner(rank_, t), load_.head(t));
-  for (Index i = 0; i < t; ++i) {
-    wanted_(i) = acceleration(first_row + i) + load_(i) - rows_.col(i).head(rank_).dot(u);
-  }
-  if (!std::isfinite(wanted_.head(t).sum())) return false;
+  auto wanted = wanted_.head(t);
+  wanted = acceleration.segment(first_row, t) + load_.head(t);
+  wanted.noalias() -= rows_.topLeftCorner(rank_, t).transpose() * u;
+  if (!std::isfinite(wanted.sum())) return false;
   const Index before = basis_size_;
   bool complete = true;
   const Index taken = ExtendBasis(t, &complete);
@@ -121,56 +121,44 @@ bool TaskHierarchy::AddLevel(Index first_row, Index t, const MatrixRef& jacobian
   if (taken == 0) return true;
 
   // min |C z − e|² + Σ λ² z²: C, e scaled by row, λ only in directions that fade.
-  auto z = step_.head(taken);
-  for (Index i = 0; i < t; ++i) wanted_(i) *= scale_(i);
+  wanted.array() *= scale_.head(t).array();
   const auto c = coefficients_.topLeftCorner(t, taken);
+  auto z = step_.head(taken);
+  z.noalias() = c.transpose() * wanted;
   auto normal = normal_.topLeftCorner(taken, taken);
-  for (Index j = 0; j < taken; ++j) {
-    for (Index i = 0; i < j; ++i) normal(i, j) = 0;
-    for (Index i = j; i < taken; ++i) normal(i, j) = c.col(i).dot(c.col(j));
-    normal(j, j) += fading_(j);
-    z(j) = c.col(j).dot(wanted_.head(t));
-  }
+  normal.triangularView<Eigen::Lower>() = c.transpose().lazyProduct(c);
+  normal.diagonal() += fading_.head(taken);
   if (!Cholesky(normal, 0.0)) return false;
   SolveLower(normal, z);
   SolveLowerTransposed(normal, z);
-  for (Index j = 0; j < taken; ++j) u.head(span_) += basis_.col(before + j).head(span_) * z(j);
+  u.head(span_).noalias() += basis_.block(0, before, span_, taken) * z;
   return true;
 }
 
 Index TaskHierarchy::ExtendBasis(Index t, bool* complete) {
+  auto rows = rows_.topLeftCorner(span_, t);
   for (Index i = 0; i < t; ++i) {
-    auto row = rows_.col(i).head(span_);
-    const double length = row.norm();
+    const double length = rows.col(i).norm();
     scale_(i) = length > 0 ? 1 / length : 0;
-    row *= scale_(i);
+    rows.col(i) *= scale_(i);
     *complete &= length > 0;
-    RemoveBasis(basis_size_, row);
+    RemoveBasis(rows.col(i));
   }
   Index taken = 0;
   for (; basis_size_ < span_ && taken < t; ++taken) {
     Index next = 0;
-    double most = -1;
-    for (Index i = 0; i < t; ++i) {
-      const double left = rows_.col(i).head(span_).squaredNorm();
-      if (left > most) {
-        most = left;
-        next = i;
-      }
-    }
-    const double left = std::sqrt(most);
+    const double left = std::sqrt(rows.colwise().squaredNorm().maxCoeff(&next));
     if (!(left > kNothingLeft)) break;
     auto direction = basis_.col(basis_size_).head(span_);
-    direction = rows_.col(next).head(span_) / left;
+    direction = rows.col(next) / left;
     // Taken out twice: what rounding left of the basis is so much longer now.
-    RemoveBasis(basis_size_, direction);
+    RemoveBasis(direction);
     direction.normalize();
     ++basis_size_;
     for (Index i = 0; i < t; ++i) {
-      auto row = rows_.col(i).head(span_);
-      const double share = direction.dot(row);
+      const double share = direction.dot(rows.col(i));
       coefficients_(i, taken) = share;
-      row -= direction * share;
+      rows.col(i) -= direction * share;
     }
     const double faded = std::min(1.0, left / kFading);
     fading_(taken) = kFading * kFading * (1 - faded * faded);
@@ -181,9 +169,9 @@ Index TaskHierarchy::ExtendBasis(Index t, bool* complete) {
   return taken;
 }
 
-void TaskHierarchy::RemoveBasis(Index directions, Eigen::Ref<Eigen::VectorXd> vector) const {
+void TaskHierarchy::RemoveBasis(Eigen::Ref<Eigen::VectorXd> vector) const {
   for (int pass = 0; pass < 2; ++pass) {
-    for (Index j = 0; j < directions; ++j) {
+    for (Index j = 0; j < basis_size_; ++j) {
       const auto direction = basis_.col(j).head(span_);
       vector -= direction * direction.dot(vector);
     }
@@ -198,7 +186,7 @@ void TaskHierarchy::ProjectIntoNullSpace(Eigen::Ref<Eigen::VectorXd> torque) con
   StackVector<Eigen::Dynamic> u(rank_);
   contact_->ReduceTorque(torque, u);
   u.tail(rank_ - span_).setZero();
-  RemoveBasis(basis_size_, u.head(span_));
+  RemoveBasis(u.head(span_));
   contact_->ExpandTorque(u, torque);
 }
 

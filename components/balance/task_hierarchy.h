@@ -68,7 +68,7 @@ class TaskHierarchy {
   /// Scales rows to unit length, takes out what is in the basis already, and extends the basis by
   /// what is left, largest first. Returns the number of directions.
   Eigen::Index ExtendBasis(Eigen::Index t, bool* complete);
-  void RemoveBasis(Eigen::Index directions, Eigen::Ref<Eigen::VectorXd> vector) const;
+  void RemoveBasis(Eigen::Ref<Eigen::VectorXd> vector) const;
 
   const ContactDynamics* contact_ = nullptr;
   TaskDynamics first_;

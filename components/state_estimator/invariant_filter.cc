@@ -31,74 +31,45 @@ void InvariantFilter::Propagate(const ImuStep& imu, double dt) {
   state_.rotation = Orthonormal(r * gamma.zero);
   for (Matrix3d& rotation : state_.foot_rotation) rotation = Orthonormal(rotation);
 
-  // Φ = I + E: E has rows for what turns and moves (R, v, p, soles: kMoved of them), columns for R,
-  // v and the biases. With X = P Eᵀ, P ← P + X + Xᵀ + E X. The gyro's noise turns everything and
-  // the accelerometer's pushes as their biases do, held over the step: E N Eᵀ is added in passing.
-  const Vector3d fall(dt * gravity_, -dt * gravity_, 0);  // E(v, R), antisymmetric: y to x, x to y
-  const Matrix3d r_gyro = -dt * r;
-  const Matrix3d v_gyro = -(dt * Skew(v) + 0.5 * dt * dt * Skew(gravity)) * r;
-  const Matrix3d p_gyro = -(dt * Skew(p) + 0.5 * dt * dt * Skew(v)) * r;
-  const Matrix3d v_force = r_gyro, p_force = 0.5 * dt * r_gyro;
-  robot::FootArray<Matrix3d> foot_gyro;
-  for (const Foot f : kFeet) {
-    foot_gyro[f].setZero();
-    if (holds_position_[f]) foot_gyro[f] = -dt * Skew(state_.foot[f]) * r;
-  }
+  // Φ = I + E. E has rows for what turns and moves (R, v, p, soles: kMoved of them), columns for R,
+  // v and the biases.
   constexpr int kMoved = kGyroBias, kRested = kSize - kMoved;
-  Covariance& c = covariance_;
-  const auto times = [](const auto& m, int first, const Matrix3d& block, int row) {
-    return block(row, 0) * m.col(first) + block(row, 1) * m.col(first + 1) +
-           block(row, 2) * m.col(first + 2);
-  };
-  // m Eᵀ.
+  Eigen::Matrix<double, kMoved, 3> by_gyro = Eigen::Matrix<double, kMoved, 3>::Zero();
+  by_gyro.middleRows<3>(kRotation) = -dt * r;
+  by_gyro.middleRows<3>(kVelocity) = -(dt * Skew(v) + 0.5 * dt * dt * Skew(gravity)) * r;
+  by_gyro.middleRows<3>(kPosition) = -(dt * Skew(p) + 0.5 * dt * dt * Skew(v)) * r;
+  for (const Foot f : kFeet) {
+    if (holds_position_[f]) by_gyro.middleRows<3>(FootRow(f)) = -dt * Skew(state_.foot[f]) * r;
+  }
+  Eigen::Matrix<double, 6, 3> by_rotation, by_accelerometer;  // rows for v and p
+  by_rotation << dt * Skew(gravity), 0.5 * dt * dt * Skew(gravity);
+  by_accelerometer << -dt * r, -0.5 * dt * dt * r;
   const auto times_e_transposed = [&](const auto& m, auto* x) {
-    for (int i = 0; i < 3; ++i) {
-      x->col(kRotation + i) = times(m, kGyroBias, r_gyro, i);
-      x->col(kVelocity + i) =
-          times(m, kGyroBias, v_gyro, i) + times(m, kAccelerometerBias, v_force, i);
-      x->col(kPosition + i) = dt * m.col(kVelocity + i) + times(m, kGyroBias, p_gyro, i) +
-                              times(m, kAccelerometerBias, p_force, i);
-      for (const Foot f : kFeet) {
-        const int row = FootRow(f) + i;
-        if (holds_position_[f]) {
-          x->col(row) = times(m, kGyroBias, foot_gyro[f], i);
-        } else {
-          x->col(row).setZero();
-        }
-      }
-      if (i == 2) continue;  // nothing falls sideways
-      x->col(kVelocity + i) += fall[i] * m.col(kRotation + 1 - i);
-      x->col(kPosition + i) += 0.5 * dt * fall[i] * m.col(kRotation + 1 - i);
-    }
+    *x = m.template middleCols<3>(kGyroBias).lazyProduct(by_gyro.transpose());
+    x->template middleCols<6>(kVelocity) +=
+        m.template middleCols<3>(kRotation).lazyProduct(by_rotation.transpose()) +
+        m.template middleCols<3>(kAccelerometerBias).lazyProduct(by_accelerometer.transpose());
+    x->template middleCols<3>(kPosition) += dt * m.template middleCols<3>(kVelocity);
   };
+
+  // P ← Φ P Φᵀ + E N Eᵀ: the gyro's noise turns everything and the accelerometer's pushes as their
+  // biases do, held over the step. With X = P Eᵀ, P ← P + X + Xᵀ + E (X + N Eᵀ).
+  Covariance& c = covariance_;
   Eigen::Matrix<double, kSize, kMoved> x;
   times_e_transposed(c, &x);
-  // Xᵀ, rows filled up to whole registers.
+  // Rows are filled up to whole registers.
   Eigen::Matrix<double, kMoved + 1, kSize> x_t;
-  x_t.row(kMoved).setZero();
-  x_t.topRows<kMoved>() = x.transpose();
-  for (int j = 0; j < kMoved; ++j) c.col(j).tail<kRested>() += x.col(j).tail<kRested>();
-  for (int j = kMoved; j < kSize; ++j) c.col(j).head<kMoved>() += x_t.col(j).head<kMoved>();
-  const auto add_noise = [&](int bias, int row, const Matrix3d& e, const Matrix3d& noise) {
-    x_t.block<3, 3>(row, bias).noalias() += e.lazyProduct(noise);
-  };
-  add_noise(kGyroBias, kRotation, r_gyro, imu.angular_velocity_noise);
-  add_noise(kGyroBias, kVelocity, v_gyro, imu.angular_velocity_noise);
-  add_noise(kGyroBias, kPosition, p_gyro, imu.angular_velocity_noise);
-  for (const Foot f : kFeet) {
-    add_noise(kGyroBias, FootRow(f), foot_gyro[f], imu.angular_velocity_noise);
-  }
-  add_noise(kAccelerometerBias, kVelocity, v_force, imu.acceleration_noise);
-  add_noise(kAccelerometerBias, kPosition, p_force, imu.acceleration_noise);
-  // With Y = Xᵀ + half of what E makes of it, Y + Yᵀ is symmetric to the last bit.
+  x_t << x.transpose(), Eigen::Matrix<double, 1, kSize>::Zero();
+  c.bottomLeftCorner<kRested, kMoved>() += x.bottomRows<kRested>();
+  c.topRightCorner<kMoved, kRested>() += x_t.topRightCorner<kMoved, kRested>();
+  x_t.block<kMoved, 3>(0, kGyroBias) += by_gyro.lazyProduct(imu.angular_velocity_noise);
+  x_t.block<6, 3>(kVelocity, kAccelerometerBias) +=
+      by_accelerometer.lazyProduct(imu.acceleration_noise);
+  // What is added to its own transpose is symmetric to the last bit.
   Eigen::Matrix<double, kMoved + 1, kMoved> y;
   times_e_transposed(x_t, &y);
   y = x_t.leftCols<kMoved>() + 0.5 * y;
-  Eigen::Matrix<double, kMoved + 1, kMoved> y_t;
-  y_t.row(kMoved).setZero();
-  y_t.topRows<kMoved>() = y.topRows<kMoved>().transpose();
-  y += y_t;
-  for (int j = 0; j < kMoved; ++j) c.col(j).head<kMoved>() += y.col(j).head<kMoved>();
+  c.topLeftCorner<kMoved, kMoved>() += y.topRows<kMoved>() + y.topRows<kMoved>().transpose();
   c.diagonal().segment<3>(kGyroBias).array() += imu.gyro_bias_walk * imu.gyro_bias_walk * dt;
   c.diagonal().segment<3>(kAccelerometerBias).array() +=
       imu.accelerometer_bias_walk * imu.accelerometer_bias_walk * dt;
@@ -258,25 +229,17 @@ bool InvariantFilter::CorrectRows(const Eigen::Matrix<double, N, 1>& innovation,
                                   const Eigen::Matrix<double, N, N>& s) {
   const Eigen::LLT<Eigen::Matrix<double, N, N>> factors(s);
   if (factors.info() != Eigen::Success) return false;
-  // With S = L Lᵀ and W = P Hᵀ L⁻ᵀ the gain is W L⁻¹, and P ← P − W Wᵀ: symmetric to the last bit.
+  // With S = L Lᵀ and W = P Hᵀ L⁻ᵀ the gain is W L⁻¹, and P ← P − W Wᵀ.
   const auto& l = factors.matrixLLT();
-  Eigen::Matrix<double, kSize, N> w;
-  Eigen::Matrix<double, N, 1> z = innovation;
+  Eigen::Matrix<double, kSize, N> w = ph;
   for (int j = 0; j < N; ++j) {
-    Error column = ph.col(j);
-    for (int i = 0; i < j; ++i) {
-      column -= w.col(i) * l(j, i);
-      z[j] -= l(j, i) * z[i];
-    }
-    const double inverse = 1 / l(j, j);
-    w.col(j) = column * inverse;
-    z[j] *= inverse;
+    for (int i = 0; i < j; ++i) w.col(j) -= w.col(i) * l(j, i);
+    w.col(j) *= 1 / l(j, j);
   }
-  Error error = w.col(0) * z[0];
-  for (int j = 1; j < N; ++j) error += w.col(j) * z[j];
+  const Error error = w.lazyProduct(factors.matrixL().solve(innovation));
   TakeOut(error);
   // Factors of a product commute: both halves get the same bits.
-  for (int j = 0; j < kSize; ++j) covariance_.col(j) -= w.lazyProduct(w.row(j).transpose());
+  covariance_ -= w.lazyProduct(w.transpose());
   return true;
 }
 

@@ -106,8 +106,6 @@ class InvariantFilter {
   void Archive(StateArchive* archive);
 
  private:
-  using Block = Eigen::Block<Covariance, 3, kSize>;
-
   static int FootRow(robot::Foot foot) { return kFoot + 3 * static_cast<int>(foot); }
   static int FootRotationRow(robot::Foot foot) {
     return kFootRotation + 3 * static_cast<int>(foot);
