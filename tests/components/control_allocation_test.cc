@@ -1,6 +1,7 @@
 // A control tick must not touch the heap: malloc itself is counted.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <set>
@@ -134,6 +135,29 @@ TEST(ControlAllocation, NoneOfAPlannerThatWalks) {
     EXPECT_EQ(stages.count(planner_status_t::STEPPING_SWINGING), 1u);
     EXPECT_EQ(stages.count(planner_status_t::STEPPING_LOADING), 1u);
   }
+}
+
+// Ever faster, as long as the push lasts: the step is chosen anew until its foot leaves.
+TEST(ControlAllocation, NoneOfAPlannerThatCatchesAPush) {
+  const robot::RobotModel model = robot::LoadTestRobot(robot::TestRobot::kDyros);
+  ControlContext context(robot::TestRobot::kDyros);
+  Harness<StepPlanner> harness(&context, "phase { support: DOUBLE } recovery { enabled: true }");
+  robot::RobotState pushed = StandingState(model);
+  robot_state_t state;
+  harness.Bind("robot_state", &state);
+  std::set<int> stages;
+  for (int tick = 0; tick < 500; ++tick) {
+    pushed.base_linear_velocity.x() = 0.01 * std::min(tick, 100);
+    state = StateMessage(model, pushed);
+    const double time_left = harness.output<planner_status_t>().touch_down_time;
+    for (auto& wrench : state.foot_wrench) wrench.force[2] = time_left > 0 ? 0 : -100;
+    const long before = allocations;
+    harness.Run(TickAt(tick));
+    ASSERT_EQ(allocations - before, 0) << "tick " << tick;
+    stages.insert(harness.output<planner_status_t>().stepping);
+  }
+  EXPECT_EQ(stages.count(planner_status_t::STEPPING_UNLOADING), 1u);
+  EXPECT_EQ(stages.count(planner_status_t::STEPPING_SWINGING), 1u);
 }
 
 TEST(ControlAllocation, TheCounterCounts) {
