@@ -68,6 +68,7 @@ class TaskHierarchy {
   /// Scales rows to unit length, takes out what is in the basis already, and extends the basis by
   /// what is left, largest first. Returns the number of directions.
   Eigen::Index ExtendBasis(Eigen::Index t, bool* complete);
+  /// Takes out of `vector` what lies in the basis' directions.
   void RemoveBasis(Eigen::Ref<Eigen::VectorXd> vector) const;
 
   const ContactDynamics* contact_ = nullptr;

@@ -111,8 +111,26 @@ TEST(ControlAllocation, NoneWithAListOfTasks) {
   }
 }
 
-// Through all of a step's stages: the foot that should be in the air is reported where it stood,
-// and loaded when it should have come down.
+/// The stages that `planner` goes through in `ticks`, told `state_at(tick)`, while it allocates
+/// nothing: the foot that should be in the air is reported where it stood, and loaded when it
+/// should have come down.
+template <class StateAt>
+std::set<int> StagesOf(Harness<StepPlanner>* planner, int ticks, const StateAt& state_at) {
+  robot_state_t state;
+  planner->Bind("robot_state", &state);
+  std::set<int> stages;
+  for (int tick = 0; tick < ticks; ++tick) {
+    state = state_at(tick);
+    const double time_left = planner->output<planner_status_t>().touch_down_time;
+    for (auto& wrench : state.foot_wrench) wrench.force[2] = time_left > 0 ? 0 : -100;
+    const long before = allocations;
+    planner->Run(TickAt(tick));
+    EXPECT_EQ(allocations - before, 0) << "tick " << tick;
+    stages.insert(planner->output<planner_status_t>().stepping);
+  }
+  return stages;
+}
+
 TEST(ControlAllocation, NoneOfAPlannerThatWalks) {
   for (const robot::TestRobot robot : {robot::TestRobot::kDyros, robot::TestRobot::kMantis}) {
     const robot::RobotModel model = robot::LoadTestRobot(robot);
@@ -120,42 +138,24 @@ TEST(ControlAllocation, NoneOfAPlannerThatWalks) {
     Harness<StepPlanner> harness(&context,
                                  "phase { support: DOUBLE } walk { enabled: true "
                                  "command { time: 0 vx: 0.1 wz: 0.1 } }");
-    robot_state_t state = StateMessage(model, StandingState(model));
-    harness.Bind("robot_state", &state);
-    std::set<int> stages;
-    for (int tick = 0; tick < 2000; ++tick) {
-      const double time_left = harness.output<planner_status_t>().touch_down_time;
-      for (auto& wrench : state.foot_wrench) wrench.force[2] = time_left > 0 ? 0 : -100;
-      const long before = allocations;
-      harness.Run(TickAt(tick));
-      ASSERT_EQ(allocations - before, 0) << "tick " << tick;
-      stages.insert(harness.output<planner_status_t>().stepping);
-    }
+    const robot_state_t standing = StateMessage(model, StandingState(model));
+    const std::set<int> stages = StagesOf(&harness, 2000, [&](int) { return standing; });
     EXPECT_GE(harness.output<planner_status_t>().num_steps, 2);
     EXPECT_EQ(stages.count(planner_status_t::STEPPING_SWINGING), 1u);
     EXPECT_EQ(stages.count(planner_status_t::STEPPING_LOADING), 1u);
   }
 }
 
-// Ever faster, as long as the push lasts: the step is chosen anew until its foot leaves.
+// The robot goes faster and faster until it has to step.
 TEST(ControlAllocation, NoneOfAPlannerThatCatchesAPush) {
   const robot::RobotModel model = robot::LoadTestRobot(robot::TestRobot::kDyros);
   ControlContext context(robot::TestRobot::kDyros);
   Harness<StepPlanner> harness(&context, "phase { support: DOUBLE } recovery { enabled: true }");
   robot::RobotState pushed = StandingState(model);
-  robot_state_t state;
-  harness.Bind("robot_state", &state);
-  std::set<int> stages;
-  for (int tick = 0; tick < 500; ++tick) {
+  const std::set<int> stages = StagesOf(&harness, 500, [&](int tick) {
     pushed.base_linear_velocity.x() = 0.01 * std::min(tick, 100);
-    state = StateMessage(model, pushed);
-    const double time_left = harness.output<planner_status_t>().touch_down_time;
-    for (auto& wrench : state.foot_wrench) wrench.force[2] = time_left > 0 ? 0 : -100;
-    const long before = allocations;
-    harness.Run(TickAt(tick));
-    ASSERT_EQ(allocations - before, 0) << "tick " << tick;
-    stages.insert(harness.output<planner_status_t>().stepping);
-  }
+    return StateMessage(model, pushed);
+  });
   EXPECT_EQ(stages.count(planner_status_t::STEPPING_UNLOADING), 1u);
   EXPECT_EQ(stages.count(planner_status_t::STEPPING_SWINGING), 1u);
 }
