@@ -95,7 +95,6 @@ export class SceneView extends View3D {
       ...this.ghosts.map(({run, samples}) => samples.load(run, motionSignals(run))),
     ]);
     this.setRow(this.run.meta.live ? this.run.numRows - 1 : 0);
-    this.look('free');
   }
 
   #build() {
@@ -179,6 +178,7 @@ export class SceneView extends View3D {
     const {samples, show} = this;
     const posed = this.robotView.setPose(samples.pose('base', row),
       samples.vector('joint', row, this.run.robot.joints.length));
+    if (posed && this.posedAt === undefined) this.look('free');  // a page may be opened before a run's first pose
     if (posed) this.posedAt = this.run.timeAt(row);
     if (posed) this.#follow();
     this.note.hidden = posed;
