@@ -25,12 +25,12 @@ bool IsPart(std::string_view type) {
 
 TickView TickMessages::view() const {
   const auto at = [](const auto& message) { return message ? &*message : nullptr; };
-  return {at(sensors), at(state),  at(estimator), at(plan),  at(planner),  at(balance),
-          at(command), at(bridge), at(push),      at(truth), at(footsteps)};
+  return {at(sensors), at(state),  at(estimator), at(plan),  at(planner),   at(balance),
+          at(command), at(bridge), at(push),      at(truth), at(footsteps), at(derived)};
 }
 
 size_t TickMessages::num_parts() const {
-  size_t count = derived.has_value();
+  size_t count = 0;
   view().VisitMessages([&](const auto* message) { count += message != nullptr; });
   return count;
 }

@@ -30,58 +30,45 @@ namespace poise::logging {
 /// called.
 inline constexpr char kDerivedChannel[] = "DERIVED";
 
-/// nullptr: the tick has none.
-struct TickView {
-  const robot_sensors_t* sensors = nullptr;
-  const robot_state_t* state = nullptr;
-  const estimator_status_t* estimator = nullptr;
-  const support_plan_t* plan = nullptr;
-  const planner_status_t* planner = nullptr;
-  const balance_torque_t* balance = nullptr;
-  const joint_command_t* command = nullptr;
-  const bridge_status_t* bridge = nullptr;
-  const external_push_t* push = nullptr;
-  const ground_truth_t* truth = nullptr;
-  const steps::footsteps_t* footsteps = nullptr;
+/// A slot for each type of message.
+template <template <class> class Slot>
+struct TickSlots {
+  Slot<robot_sensors_t> sensors{};
+  Slot<robot_state_t> state{};
+  Slot<estimator_status_t> estimator{};
+  Slot<support_plan_t> plan{};
+  Slot<planner_status_t> planner{};
+  Slot<balance_torque_t> balance{};
+  Slot<joint_command_t> command{};
+  Slot<bridge_status_t> bridge{};
+  Slot<external_push_t> push{};
+  Slot<ground_truth_t> truth{};
+  Slot<steps::footsteps_t> footsteps{};
+  Slot<derived::signals_t> derived{};
 
-  /// Calls visit(const T*&) for each.
-  template <class Visit>
-  void VisitMessages(const Visit& visit) {
-    std::apply([&](auto&... message) { (visit(message), ...); },
-               std::tie(sensors, state, estimator, plan, planner, balance, command, bridge, push,
-                        truth, footsteps));
-  }
-};
-
-struct TickMessages {
-  int64_t tick = -1;
-  int64_t utime = 0;  ///< us, the same of all
-  std::optional<robot_sensors_t> sensors;
-  std::optional<robot_state_t> state;
-  std::optional<estimator_status_t> estimator;
-  std::optional<support_plan_t> plan;
-  std::optional<planner_status_t> planner;
-  std::optional<balance_torque_t> balance;
-  std::optional<joint_command_t> command;
-  std::optional<bridge_status_t> bridge;
-  std::optional<external_push_t> push;
-  std::optional<ground_truth_t> truth;
-  std::optional<steps::footsteps_t> footsteps;
-  std::optional<derived::signals_t> derived;
-
-  TickView view() const;
-  size_t num_parts() const;
-  /// Takes an encoded message, if it is whole and the first of one of these types; all but
-  /// `derived` with finite numbers alone. True: it has taken it.
-  bool Take(std::string_view type, std::span<const uint8_t> data);
-
-  /// Calls visit(std::optional<T>&) for each.
+  /// Calls visit(Slot<T>&) for each.
   template <class Visit>
   void VisitMessages(const Visit& visit) {
     std::apply([&](auto&... message) { (visit(message), ...); },
                std::tie(sensors, state, estimator, plan, planner, balance, command, bridge, push,
                         truth, footsteps, derived));
   }
+};
+
+template <class T>
+using MessagePointer = const T*;
+/// nullptr: the tick has none.
+using TickView = TickSlots<MessagePointer>;
+
+struct TickMessages : TickSlots<std::optional> {
+  int64_t tick = -1;
+  int64_t utime = 0;  ///< us, the same of all
+
+  TickView view() const;
+  size_t num_parts() const;
+  /// Takes an encoded message, if it is whole and the first of one of these types; all but
+  /// `derived` with finite numbers alone. True: it has taken it.
+  bool Take(std::string_view type, std::span<const uint8_t> data);
 };
 
 /// Gathers the messages of every `every`-th tick, from several channels that need not be in step.
