@@ -1,15 +1,13 @@
 #include "logging/derived/derived_reader.h"
 
-#include <vector>
-
 #include "components/robot_files/robot_files.h"
 #include "logging/channel_ticks.h"
 
 namespace poise::logging {
 
-DerivedReader::DerivedReader(LogReader* reader, const RunSpec& spec, const robot::RobotModel* robot)
+DerivedReader::DerivedReader(LogReader* reader, const RunSpec& spec, const robot::RobotModel& robot)
     : reader_(reader) {
-  if (robot != nullptr) Start(spec, *robot);
+  Start(spec, robot);
 }
 
 DerivedReader::DerivedReader(LogReader* reader, const LogMessages& messages) : reader_(reader) {
@@ -25,12 +23,7 @@ DerivedReader::DerivedReader(LogReader* reader, const LogMessages& messages) : r
 void DerivedReader::Start(const RunSpec& spec, const robot::RobotModel& robot) {
   for (const Channel& channel : spec.graph().channel()) {
     if (channel.external()) continue;
-    const MessageType& type = ChannelType(channel);
-    const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
-    lanes_.try_emplace(
-        channel.name(),
-        Lane{&type, PacketFilter(type.fingerprint, static_cast<int>(type.encoded_size(counts)),
-                                 counts, spec.run_id())});
+    lanes_.try_emplace(channel.name(), Lane{&ChannelType(channel), ChannelFilter(spec, channel)});
   }
   derived_.emplace(spec, robot, kMostTicks);
   if (!derived_->signals().any()) derived_.reset();

@@ -20,8 +20,8 @@ class DerivedReader {
   /// Ticks that DERIVED may come behind the others: a log may hold a message that late.
   static constexpr size_t kMostTicks = 256;
 
-  /// `robot`: nullptr, not known. All must outlive it.
-  DerivedReader(LogReader* reader, const RunSpec& spec, const robot::RobotModel* robot);
+  /// All must outlive it.
+  DerivedReader(LogReader* reader, const RunSpec& spec, const robot::RobotModel& robot);
   /// Those of `messages`, read by `reader`.
   DerivedReader(LogReader* reader, const LogMessages& messages);
 

@@ -104,7 +104,7 @@ std::vector<ChannelRead> ReadChannels(const std::string& path, const RunRecord& 
     add(channel.name(), ChannelType(channel), ChannelFilter(run.spec, channel), channel.external());
   }
   LogReader reader(path);
-  DerivedReader events(&reader, run.spec, &run.robot);
+  DerivedReader events(&reader, run.spec, run.robot);
   std::vector<uint8_t> told;  // the last message, where some of it is left out
   LogEvent event;
   while (events.Next(&event)) {
