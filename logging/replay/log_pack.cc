@@ -37,40 +37,25 @@ struct KeptEvent {
   std::vector<uint8_t> data;
 };
 
+/// Check sums of records as they stand in a file.
+struct BlockSums {
+  int64_t events = 0;
+  uint64_t bytes = 0;
+  std::vector<uint32_t> blocks;  // CRC-32 of each kBlockEvents records, of the last ones too
+
+  void Add(std::span<const uint8_t> record) {
+    if (events++ % kBlockEvents == 0) blocks.push_back(0);
+    uint32_t& sum = blocks.back();
+    sum = static_cast<uint32_t>(crc32_z(sum, record.data(), static_cast<z_size_t>(record.size())));
+    bytes += record.size();
+  }
+};
+
 struct PackedRun {
   RunSpec spec;
   std::vector<KeptEvent> kept;  // by number
-  int64_t events = 0;
   int64_t ticks = 0;
-  uint64_t bytes = 0;
-  std::vector<uint32_t> blocks;  // CRC-32 of each kBlockEvents records
-};
-
-/// Check sums of records as they stand in a file.
-class BlockSums {
- public:
-  void Add(std::span<const uint8_t> record) {
-    sum_ =
-        static_cast<uint32_t>(crc32_z(sum_, record.data(), static_cast<z_size_t>(record.size())));
-    bytes_ += record.size();
-    if (++events_ % kBlockEvents == 0) EndBlock();
-  }
-  void Close() {
-    if (events_ % kBlockEvents != 0) EndBlock();
-  }
-  const std::vector<uint32_t>& blocks() const { return blocks_; }
-  int64_t events() const { return events_; }
-  uint64_t bytes() const { return bytes_; }
-
- private:
-  void EndBlock() {
-    blocks_.push_back(sum_);
-    sum_ = 0;
-  }
-  uint32_t sum_ = 0;
-  int64_t events_ = 0;
-  uint64_t bytes_ = 0;
-  std::vector<uint32_t> blocks_;
+  BlockSums sums;
 };
 
 /// Makes a run's records again, in the order of its log, and compares their check sums.
@@ -123,31 +108,30 @@ class RemadeLog {
       throw LogError(fmt::format("{}: cannot be made again: {}", path_, runner.end_detail()));
     }
     PutKept();
-    sums_.Close();
-    CheckBlocks();
-    if (sums_.events() != run_.events || sums_.bytes() != run_.bytes) Differ();
+    CheckBlocks(sums_.blocks.size());
+    if (sums_.events != run_.sums.events || sums_.bytes != run_.sums.bytes) Differ();
     on_tick(run_.ticks, run_.ticks);
   }
 
  private:
   /// Events that came from elsewhere, at their places.
   void PutKept() {
-    while (next_kept_ < run_.kept.size() && run_.kept[next_kept_].number == sums_.events()) {
+    while (next_kept_ < run_.kept.size() && run_.kept[next_kept_].number == sums_.events) {
       const KeptEvent& event = run_.kept[next_kept_++];
       Put(event.channel, event.utime, event.data);
     }
   }
   void Put(std::string_view channel, int64_t utime, std::span<const uint8_t> data) {
-    PutRecord(sums_.events(), channel, utime, data, &record_);
+    PutRecord(sums_.events, channel, utime, data, &record_);
     sums_.Add(record_);
     sink_(record_);
-    CheckBlocks();
+    CheckBlocks(static_cast<size_t>(sums_.events / kBlockEvents));
   }
-  void CheckBlocks() {
-    for (; checked_ < sums_.blocks().size(); ++checked_) {
-      if (checked_ >= run_.blocks.size() || sums_.blocks()[checked_] != run_.blocks[checked_]) {
-        Differ();
-      }
+  /// Compares the first `whole` blocks.
+  void CheckBlocks(size_t whole) {
+    for (; checked_ < whole; ++checked_) {
+      const std::vector<uint32_t>& packed = run_.sums.blocks;
+      if (checked_ >= packed.size() || sums_.blocks[checked_] != packed[checked_]) Differ();
     }
   }
   [[noreturn]] void Differ() const {
@@ -186,11 +170,11 @@ PackedRun Describe(const std::string& path) {
     if (!channel.external()) made[channel.name()] = FindMessageType(channel.type());
   }
   reader.Rewind();
-  BlockSums sums;
+  BlockSums& sums = run.sums;
   LogEvent event;
   while (reader.Next(&event)) {
     const auto channel = made.find(event.channel);
-    if (event.number != sums.events()) refuse("its events are not numbered one after the other");
+    if (event.number != sums.events) refuse("its events are not numbered one after the other");
     const size_t size = kEventLogHeader + event.channel.size() + event.data.size();
     sums.Add({reader.bytes() + event.offset, size});
     if (channel != made.end()) {
@@ -208,21 +192,17 @@ PackedRun Describe(const std::string& path) {
                         {event.data.begin(), event.data.end()}});
   }
   if (reader.damages() > 0) refuse("it is damaged: see poise log check");
-  sums.Close();
-  run.events = sums.events();
-  run.bytes = sums.bytes();
-  run.blocks = sums.blocks();
   return run;
 }
 
 void WritePacked(const PackedRun& run, const std::string& path) {
   nlohmann::ordered_json json;
   json["format"] = kPackFormat;
-  json["bytes"] = run.bytes;
-  json["events"] = run.events;
+  json["bytes"] = run.sums.bytes;
+  json["events"] = run.sums.events;
   json["ticks"] = run.ticks;
   for (const KeptEvent& event : run.kept) json["kept"].push_back(event.number);
-  json["blocks"] = run.blocks;
+  json["blocks"] = run.sums.blocks;
   const std::string text = json.dump();
   std::filesystem::remove(path);  // of an earlier time; the log is still there
   PartialFile file(path);
@@ -252,10 +232,10 @@ PackedRun ReadPacked(const std::string& path) {
         throw LogError(fmt::format("{}: has format {} of packed logs; this build knows {}", path,
                                    json.at("format").get<int>(), kPackFormat));
       }
-      run.bytes = json.at("bytes").get<uint64_t>();
-      run.events = json.at("events").get<int64_t>();
+      run.sums.bytes = json.at("bytes").get<uint64_t>();
+      run.sums.events = json.at("events").get<int64_t>();
       run.ticks = json.at("ticks").get<int64_t>();
-      run.blocks = json.at("blocks").get<std::vector<uint32_t>>();
+      run.sums.blocks = json.at("blocks").get<std::vector<uint32_t>>();
       const auto numbers = json.at("kept").get<std::vector<int64_t>>();
       if (numbers.size() != run.kept.size()) {
         throw LogError(fmt::format("{}: lacks events that were kept: it is damaged", path));
@@ -301,7 +281,7 @@ PackResult PackLog(const std::string& log, const std::string& packed,
   const PackedRun run = Describe(log);
   RemadeLog(run, log, [](std::span<const uint8_t>) {}).Make(registry, on_tick);
   WritePacked(run, packed);
-  return {run.bytes, FileSize(packed), run.ticks};
+  return {run.sums.bytes, FileSize(packed), run.ticks};
 }
 
 PackResult UnpackLog(const std::string& packed, const std::string& log,
@@ -315,7 +295,7 @@ PackResult UnpackLog(const std::string& packed, const std::string& log,
     file.Write({reinterpret_cast<const char*>(record.data()), record.size()});
   }).Make(registry, on_tick);
   file.Close();
-  return {run.bytes, FileSize(packed), run.ticks};
+  return {run.sums.bytes, FileSize(packed), run.ticks};
 }
 
 }  // namespace poise::logging
