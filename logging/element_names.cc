@@ -37,6 +37,17 @@ std::vector<std::string> IfUsable(std::vector<std::string> names) {
 
 }  // namespace
 
+std::string WithoutIndexes(std::string_view path) {
+  std::string field;
+  bool index = false;
+  for (const char c : path) {
+    index = index || c == '[';
+    if (!index) field.push_back(c);
+    index = index && c != ']';
+  }
+  return field;
+}
+
 ElementNames::ElementNames(const robot::RobotModel& robot) {
   std::vector<std::string> joints;
   for (const robot::Joint& joint : robot.joints()) joints.push_back(joint.name);

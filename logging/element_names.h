@@ -11,6 +11,9 @@
 
 namespace poise::logging {
 
+/// "foot_wrench.force" of "foot_wrench[1].force[2]".
+std::string WithoutIndexes(std::string_view path);
+
 /// Names of the arrays that num_joints, num_motors and num_feet size, as the .lcm files declare
 /// them. Immutable.
 class ElementNames {

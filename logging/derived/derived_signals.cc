@@ -10,6 +10,7 @@
 #include "components/messages/conversions.h"
 #include "derived/message_traits.hpp"
 #include "logging/channel_ticks.h"
+#include "logging/element_names.h"
 #include "poise/message_traits.hpp"
 #include "steps/message_traits.hpp"
 
@@ -328,12 +329,7 @@ DerivedSignals::DerivedSignals(const RunSpec& spec, const robot::RobotModel& rob
 }
 
 bool DerivedSignals::Tells(std::string_view path) const {
-  std::string field;
-  bool index = false;
-  for (const char c : path) {
-    index = c == '[' || (index && c != ']');
-    if (!index && c != ']') field.push_back(c);
-  }
+  const std::string field = WithoutIndexes(path);
   return std::ranges::any_of(Definitions(), [&](const Definition& each) {
     return IsTold(each, types_) && std::ranges::any_of(each.fields, [&](std::string_view name) {
              return field == name || field.starts_with(std::string(name) + '.');

@@ -9,24 +9,13 @@
 #include "components/framework/operator_acts.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
+#include "logging/element_names.h"
 #include "logging/replay/message_difference.h"
 #include "logging/run_log_writer.h"
 #include "logging/run_record.h"
 
 namespace poise::logging {
 namespace {
-
-/// "foot_wrench.force" of "foot_wrench[1].force[2]".
-std::string WithoutIndexes(const std::string& path) {
-  std::string field;
-  bool index = false;
-  for (const char c : path) {
-    index = index || c == '[';
-    if (!index) field.push_back(c);
-    index = index && c != ']';
-  }
-  return field;
-}
 
 void AddDifferences(const MessageType& type, std::span<const uint8_t> logged,
                     std::span<const uint8_t> replayed, int64_t tick, ReplayedChannel* channel) {
@@ -38,8 +27,7 @@ void AddDifferences(const MessageType& type, std::span<const uint8_t> logged,
   }
   for (const ScalarDifference& scalar : *scalars) {
     const std::string name = WithoutIndexes(scalar.path);
-    const auto same = [&](const FieldDifference& field) { return field.field == name; };
-    auto field = std::find_if(channel->fields.begin(), channel->fields.end(), same);
+    auto field = std::ranges::find(channel->fields, name, &FieldDifference::field);
     if (field == channel->fields.end()) {
       channel->fields.push_back({name, tick, -1, 0, {}, 0, -1, {}, {}});
       field = channel->fields.end() - 1;
@@ -59,8 +47,8 @@ void AddDifferences(const MessageType& type, std::span<const uint8_t> logged,
 }  // namespace
 
 bool ReplayedComponent::equal() const {
-  return std::all_of(outputs.begin(), outputs.end(),
-                     [](const ReplayedChannel& output) { return output.differing == 0; });
+  return std::ranges::all_of(outputs,
+                             [](const ReplayedChannel& output) { return output.differing == 0; });
 }
 
 LogReplay::LogReplay(const std::string& path) : path_(path), messages_(path) {
@@ -114,17 +102,8 @@ class ReplayedStages {
   }
 
   ReplayedComponent Run() {
-    ReplayedComponent result;
-    result.name = component_.name;
-    result.ticks = end_;
-    for (const BoundStage& stage : stages_) {
-      for (const Output& output : stage.outputs) {
-        result.outputs.emplace_back().channel =
-            ChannelName(instance_.output(), output.port->name());
-      }
-    }
-    result.external_messages = acts_;
-    result.unplaced_messages = unanswered_acts_;
+    result_.name = component_.name;
+    result_.ticks = end_;
     const int64_t start = NowNanoseconds();
     size_t next_act = 0;
     for (int64_t t = 0; t < end_; ++t) {
@@ -133,14 +112,12 @@ class ReplayedStages {
       }
       const Tick tick = MakeTick(t, spec_.tick_period(), spec_.lead_ticks());
       position_->tick.store(t, std::memory_order_relaxed);
-      size_t first_output = 0;
       for (BoundStage& stage : stages_) {
-        if (t < stage.end) RunStage(&stage, tick, first_output, &result);
-        first_output += stage.outputs.size();
+        if (t < stage.end) RunStage(&stage, tick);
       }
     }
-    result.wall_time = static_cast<double>(NowNanoseconds() - start) * 1e-9;
-    return result;
+    result_.wall_time = static_cast<double>(NowNanoseconds() - start) * 1e-9;
+    return std::move(result_);
   }
 
  private:
@@ -154,7 +131,8 @@ class ReplayedStages {
   };
   struct Output {
     OutputPort* port;
-    int channel;  // of the log's graph; -1: it has none of that name
+    int channel;    // of the log's graph; -1: it has none of that name
+    size_t result;  // in result_.outputs
   };
   struct BoundStage {
     const Stage* stage;
@@ -210,7 +188,8 @@ class ReplayedStages {
     }
     for (OutputPort* port : stage.outputs) {
       const int channel = ChannelOf(instance_.output(), port->name());
-      bound.outputs.push_back({port, channel});
+      bound.outputs.push_back({port, channel, result_.outputs.size()});
+      result_.outputs.emplace_back().channel = ChannelName(instance_.output(), port->name());
       if (channel < 0) continue;
       CheckSize(channel, port->encoded_size());
       end_ = std::max(end_, lane(channel).ticks.newest() + 1);
@@ -246,12 +225,12 @@ class ReplayedStages {
             !placed.insert(act.id).second) {
           continue;
         }
-        ++acts_;
+        ++result_.external_messages;
         const auto answer = answers.find(act.id);
         if (answer == answers.end()) {
           // An act without an answer may have died with its process; the tick that it names is the
           // best guess.
-          ++unanswered_acts_;
+          ++result_.unplaced_messages;
           placed_acts_.push_back({act, act.tick});
         } else if (answer->second.verdict == operate::answer_t::VERDICT_DONE) {
           placed_acts_.push_back({act, answer->second.tick});
@@ -334,14 +313,14 @@ class ReplayedStages {
   }
 
   /// Shows an input the message it had in the run.
-  void Show(Input* input, int64_t tick, ReplayedComponent* result) {
+  void Show(Input* input, int64_t tick) {
     const InputKind kind = input->port->kind();
     if (kind == InputKind::kLatest) {
       while (input->next_external < input->external.size() &&
              input->external[input->next_external].tick <= tick) {
         const ExternalMessage& message = input->external[input->next_external++];
-        ++result->external_messages;
-        result->unplaced_messages += message.certain ? 0 : 1;
+        ++result_.external_messages;
+        result_.unplaced_messages += message.certain ? 0 : 1;
         input->present = Decode(input, message.data) || input->present;
       }
     } else {
@@ -360,9 +339,8 @@ class ReplayedStages {
            input->port->Decode(data.data(), static_cast<int>(data.size()), input->message.get());
   }
 
-  void RunStage(BoundStage* stage, const Tick& tick, size_t first_output,
-                ReplayedComponent* result) {
-    for (Input& input : stage->inputs) Show(&input, tick.index, result);
+  void RunStage(BoundStage* stage, const Tick& tick) {
+    for (Input& input : stage->inputs) Show(&input, tick.index);
     for (const Output& output : stage->outputs) {
       output.port->Stamp(spec_.run_id(), tick.index, tick.utime);
     }
@@ -370,13 +348,12 @@ class ReplayedStages {
     stage->stage->run(tick);
     position_->stage.store(RunPosition::kNoStage, std::memory_order_relaxed);
     for (const Input& input : stage->inputs) input.port->Bind(nullptr);
-    for (size_t i = 0; i < stage->outputs.size(); ++i) {
-      const Output& output = stage->outputs[i];
+    for (const Output& output : stage->outputs) {
       if (output.channel < 0) continue;
       const auto size = static_cast<size_t>(output.port->encoded_size());
       buffer_.resize(size);
       output.port->Encode(buffer_.data(), static_cast<int>(size));
-      ReplayedChannel& channel = result->outputs[first_output + i];
+      ReplayedChannel& channel = result_.outputs[output.result];
       const std::span<const uint8_t> logged = Logged(output.channel, tick.index);
       ++channel.ticks;
       if (!SameBits(*lane(output.channel).type, logged, buffer_)) {
@@ -405,7 +382,6 @@ class ReplayedStages {
   ChangedMessages* changed_;
   ActInput* act_input_ = nullptr;
   std::vector<PlacedAct> placed_acts_;  // by tick
-  int64_t acts_ = 0, unanswered_acts_ = 0;
   SharedObjects shared_;  // of its own, as in a process
   ConfiguredComponent component_;
   std::vector<BoundStage> stages_;
@@ -413,6 +389,7 @@ class ReplayedStages {
   RunPosition* position_ = &own_position_;
   int64_t end_ = 0;
   std::vector<uint8_t> buffer_;
+  ReplayedComponent result_;
 };
 
 ReplayedComponent LogReplay::Replay(const RunSpec& spec, int index,
