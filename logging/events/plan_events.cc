@@ -27,7 +27,7 @@ std::string OutcomeText(int8_t outcome) {
 }
 
 void AddPhases(const RunRecord& run, EventList* events) {
-  const std::optional<SchedulePlan> schedule = ReadSchedulePlan(run);
+  const auto schedule = ReadSchedulePlan(run);
   std::optional<int32_t> phase;
   double last_time = 0;
   for (const auto& [tick, planner] : Messages(run.planner, 0, run.num_ticks)) {
@@ -37,9 +37,9 @@ void AddPhases(const RunRecord& run, EventList* events) {
     if (!began) continue;
     phase = planner->phase;
     const auto i = static_cast<size_t>(*phase);
-    const bool named = schedule && i < schedule->phases.size() && !schedule->phases[i].name.empty();
+    const bool named = schedule && i < schedule->size() && !(*schedule)[i].name.empty();
     events->Add(tick, "phase_began",
-                (named ? fmt::format("phase {}, {}", *phase, schedule->phases[i].name)
+                (named ? fmt::format("phase {}, {}", *phase, (*schedule)[i].name)
                        : fmt::format("phase {}", *phase)) +
                     OutcomeText(planner->began_by));
   }

@@ -15,73 +15,14 @@ namespace {
 constexpr double kWrenchTolerance = 1e-6;  // N, N·m
 constexpr double kCopTolerance = 1e-9;     // m
 
-bool InContact(const support_plan_t& plan, int foot) {
-  return plan.in_contact[static_cast<size_t>(foot)] != 0;
-}
-
-Answer Fold(const RunRecord& run, const std::function<Answer(int64_t)>& value,
-            const std::function<double(double, double)>& join) {
+template <class Join>
+Answer Fold(const RunRecord& run, const std::function<Answer(int64_t)>& value, Join join) {
   Answer result;
   for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
     if (const Answer v = value(tick)) result = result ? join(*result, *v) : *v;
   }
   return result;
 }
-
-}  // namespace
-
-Answer Maximum(const RunRecord& run, const std::function<Answer(int64_t)>& value) {
-  return Fold(run, value, [](double a, double b) { return std::max(a, b); });
-}
-
-Answer Minimum(const RunRecord& run, const std::function<Answer(int64_t)>& value) {
-  return Fold(run, value, [](double a, double b) { return std::min(a, b); });
-}
-
-Answer RootMeanSquare(const RunRecord& run, const std::function<Answer(int64_t)>& value) {
-  int64_t count = 0;
-  const Answer sum = Fold(
-      run,
-      [&](int64_t tick) -> Answer {
-        const Answer v = value(tick);
-        if (!v) return {};
-        ++count;
-        return *v * *v;
-      },
-      [](double a, double b) { return a + b; });
-  if (!sum) return {};
-  return std::sqrt(*sum / static_cast<double>(count));
-}
-
-Answer CountTicks(const RunRecord& run, const std::function<std::optional<bool>(int64_t)>& holds) {
-  return Fold(
-      run,
-      [&](int64_t tick) -> Answer {
-        const std::optional<bool> h = holds(tick);
-        if (!h) return {};
-        return *h ? 1.0 : 0.0;
-      },
-      [](double a, double b) { return a + b; });
-}
-
-std::optional<BalancingIntervals> Balancing(const RunRecord& run) {
-  if (run.balance.empty()) return {};
-  BalancingIntervals result;
-  bool before = false;
-  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
-    const balance_torque_t* balance = run.balance.at(tick);
-    const bool on = balance != nullptr && (balance->active_x != 0 || balance->active_y != 0);
-    if (on && !before && result.activations++ == 0) result.first = run.time(tick);
-    if (on) {
-      result.last = run.time(tick);
-      result.active += run.spec.tick_period();
-    }
-    before = on;
-  }
-  return result;
-}
-
-namespace {
 
 // Views hold what is asked for alone: a long run's messages are read from the disk.
 
@@ -102,6 +43,47 @@ RunMessages MessagesOf(const RunRecord& run) {
 }
 
 }  // namespace
+
+Answer Maximum(const RunRecord& run, const std::function<Answer(int64_t)>& value) {
+  return Fold(run, value, std::ranges::max);
+}
+
+Answer Minimum(const RunRecord& run, const std::function<Answer(int64_t)>& value) {
+  return Fold(run, value, std::ranges::min);
+}
+
+Answer RootMeanSquare(const RunRecord& run, const std::function<Answer(int64_t)>& value) {
+  Mean squares;
+  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
+    if (const Answer v = value(tick)) squares.Add(*v * *v);
+  }
+  return squares.Root();
+}
+
+Answer CountTicks(const RunRecord& run, const std::function<std::optional<bool>(int64_t)>& holds) {
+  Answer count;
+  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
+    if (const std::optional<bool> h = holds(tick)) count = count.value_or(0) + (*h ? 1 : 0);
+  }
+  return count;
+}
+
+std::optional<BalancingIntervals> Balancing(const RunRecord& run) {
+  if (run.balance.empty()) return {};
+  BalancingIntervals result;
+  bool before = false;
+  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
+    const balance_torque_t* balance = run.balance.at(tick);
+    const bool on = balance != nullptr && (balance->active_x != 0 || balance->active_y != 0);
+    if (on && !before && result.activations++ == 0) result.first = run.time(tick);
+    if (on) {
+      result.last = run.time(tick);
+      result.active += run.spec.tick_period();
+    }
+    before = on;
+  }
+  return result;
+}
 
 std::optional<Wrench> KnownWrench(const RunRecord& run, size_t foot, int64_t tick) {
   return KnownWrench(run.robot, FeetOf(run, tick), foot);
@@ -144,7 +126,7 @@ std::optional<Wrench> WrenchError(const RunRecord& run, int foot, int64_t tick) 
   const joint_command_t* command = run.command.at(tick - 1);
   if (plan == nullptr || command == nullptr) return {};
   const auto f = static_cast<size_t>(foot);
-  if (!InContact(*plan, foot) || !TellsFoot(*command, f)) return {};
+  if (plan->in_contact[f] == 0 || !TellsFoot(*command, f)) return {};
   const auto wrench = KnownWrench(run, f, tick);
   if (!wrench) return {};
   return *wrench - GetWrench(command->foot_wrench[f]);

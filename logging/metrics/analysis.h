@@ -4,10 +4,10 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <optional>
 #include <ranges>
-#include <type_traits>
 #include <utility>
 
 #include "components/balance/convex_polygon.h"
@@ -28,31 +28,40 @@ Answer RootMeanSquare(const RunRecord& run, const std::function<Answer(int64_t t
 Answer CountTicks(const RunRecord& run,
                   const std::function<std::optional<bool>(int64_t tick)>& holds);
 
-template <class R>
-struct AsOptional {
-  using Type = std::optional<R>;
+/// Mean of what is added; empty without any.
+class Mean {
+ public:
+  void Add(double value) {
+    sum_ += value;
+    ++count_;
+  }
+  Answer Value() const {
+    return count_ > 0 ? Answer(sum_ / static_cast<double>(count_)) : Answer();
+  }
+  /// Of squares: their root mean square.
+  Answer Root() const { return count_ > 0 ? Answer(std::sqrt(*Value())) : Answer(); }
+
+ private:
+  double sum_ = 0;
+  int64_t count_ = 0;
 };
-template <class R>
-struct AsOptional<std::optional<R>> {
-  using Type = std::optional<R>;
-};
+
 /// By tick, what `of` tells of the message; nothing where the series has none.
 template <class T, class F>
 auto OfTick(const Series<T>& series, F of) {
-  using Told = typename AsOptional<std::invoke_result_t<F, const T&>>::Type;
-  return [&series, of](int64_t tick) -> Told {
+  return [&series, of](int64_t tick) {
     const T* const message = series.at(tick);
-    return message != nullptr ? Told(of(*message)) : Told();
+    return message != nullptr ? std::optional(of(*message)) : std::nullopt;
   };
 }
 /// OfTick of two series' messages.
 template <class T, class U, class F>
 auto OfTick(const Series<T>& series, const Series<U>& other, F of) {
-  using Told = typename AsOptional<std::invoke_result_t<F, const T&, const U&>>::Type;
-  return [&series, &other, of](int64_t tick) -> Told {
+  return [&series, &other, of](int64_t tick) {
     const T* const message = series.at(tick);
     const U* const beside = other.at(tick);
-    return message != nullptr && beside != nullptr ? Told(of(*message, *beside)) : Told();
+    const bool both = message != nullptr && beside != nullptr;
+    return both ? std::optional(of(*message, *beside)) : std::nullopt;
   };
 }
 

@@ -26,14 +26,14 @@ class ReferenceEnds {
   void Update(const planner_status_t& planner, const support_plan_t& plan) {
     if (planner.phase == phase_) return;
     phase_ = planner.phase;
-    if (!schedule_ || phase_ < 0 || static_cast<size_t>(phase_) >= schedule_->phases.size()) return;
+    if (!schedule_ || phase_ < 0 || static_cast<size_t>(phase_) >= schedule_->size()) return;
     std::array<double, 2> level{plan.foot_reference[0].position[2],
                                 plan.foot_reference[1].position[2]};
     int at = phase_;
     // Phases are taken as they follow each other when all goes well; a plan may go round in
     // circles.
-    for (size_t steps = 0; at >= 0 && steps < schedule_->phases.size(); ++steps) {
-      const PhasePlan& phase = schedule_->phases[static_cast<size_t>(at)];
+    for (size_t steps = 0; at >= 0 && steps < schedule_->size(); ++steps) {
+      const PhasePlan& phase = (*schedule_)[static_cast<size_t>(at)];
       if (at != phase_ && phase.double_support) break;
       const bool now = steps == 0;
       at = phase.next;
@@ -56,7 +56,7 @@ class ReferenceEnds {
   }
 
  private:
-  std::optional<SchedulePlan> schedule_;
+  std::optional<std::vector<PhasePlan>> schedule_;
   int32_t phase_ = -1;
   std::array<std::optional<double>, 2> end_;
 };

@@ -1,7 +1,6 @@
 // The metrics by subject, as metrics.cc lists them. Not for users of metrics.h.
 #pragma once
 
-#include <cmath>
 #include <functional>
 #include <string>
 #include <type_traits>
@@ -120,23 +119,6 @@ inline Compute OfReference(Compute compute) {
     return run.reference ? compute(*run.reference) : Answer();
   };
 }
-
-/// Root of the mean of squares that are given.
-class MeanSquare {
- public:
-  void Add(double square) {
-    sum_ += square;
-    ++count_;
-  }
-  Answer Root() const {
-    if (count_ == 0) return {};
-    return std::sqrt(sum_ / static_cast<double>(count_));
-  }
-
- private:
-  double sum_ = 0;
-  int64_t count_ = 0;
-};
 
 void AddOutcome(MetricList* list);    ///< how the run ended, and how long it waited
 void AddMotion(MetricList* list);     ///< COM, body and swing foot

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "logging/metrics/metric_groups.h"
 
@@ -14,13 +15,14 @@ double TorquePerAmpere(const RunRecord& run, size_t joint) {
 
 /// Deviation, N·m, of the drives' torque from what the bridge ordered `delay` ticks before.
 struct Deviation {
+  int delay;
   double largest = 0;
   double squares = 0;
   int64_t count = 0;
 };
 
 Deviation DeviationAt(const RunRecord& run, int delay) {
-  Deviation result;
+  Deviation result{delay};
   for (int64_t tick = std::max<int64_t>(run.first_tick, kMostDelay); tick < run.num_ticks; ++tick) {
     const drive_command_t* drive = run.drive.at(tick);
     const bridge_status_t* bridge = run.bridge.at(tick - delay);
@@ -36,17 +38,15 @@ Deviation DeviationAt(const RunRecord& run, int delay) {
   return result;
 }
 
-/// The delay at which the drives' torque is nearest to the bridge's; -1: nothing to compare.
-int BestDelay(const RunRecord& run) {
-  int best = -1;
-  double least = 0;
+/// At the delay at which the drives' torque is nearest to the bridge's; empty: nothing to compare.
+std::optional<Deviation> LeastDeviation(const RunRecord& run) {
+  std::optional<Deviation> least;
   for (int delay = 0; delay <= kMostDelay; ++delay) {
     const Deviation deviation = DeviationAt(run, delay);
-    if (deviation.count == 0 || (best >= 0 && deviation.squares >= least)) continue;
-    best = delay;
-    least = deviation.squares;
+    const bool farther = least && deviation.squares >= least->squares;
+    if (deviation.count > 0 && !farther) least = deviation;
   }
-  return best;
+  return least;
 }
 
 /// Smallest change of a drive's torque from tick to tick: its quantisation, where it has one.
@@ -73,16 +73,15 @@ void AddDrives(MetricList* list) {
   list->Add("drive_torque_error", "N·m",
             "largest difference between a joint's torque as the bridge ordered it and as the "
             "drives gave it, at the delay between them",
-            [](const RunRecord& run) -> Answer {
-              const int delay = BestDelay(run);
-              if (delay < 0) return {};
-              return DeviationAt(run, delay).largest;
+            [](const RunRecord& run) {
+              const auto deviation = LeastDeviation(run);
+              return deviation ? Answer(deviation->largest) : Answer();
             });
   list->Add("drive_delay", "ticks",
             "delay from the bridge's torque to the drives', at which they agree best",
             [](const RunRecord& run) {
-              const int delay = BestDelay(run);
-              return delay < 0 ? Answer() : delay;
+              const auto deviation = LeastDeviation(run);
+              return deviation ? Answer(deviation->delay) : Answer();
             });
   // A counter of the bridge at the end of the run.
   const auto add = [&](const char* name, const char* text, int64_t bridge_status_t::*counter) {

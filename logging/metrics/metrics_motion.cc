@@ -11,12 +11,12 @@
 namespace poise::logging {
 namespace {
 
+Answer SizeOf(Answer value) { return value ? Answer(std::abs(*value)) : value; }
+
 /// m, size of the distance along an axis of the COM that a message tells of from its reference.
 auto ComErrorOf(auto series, int axis) {
   return Of(&RunRecord::plan, series, [axis](const auto& plan, const auto& message) {
-    Answer error = ComError(plan, message.com_position, axis);
-    if (error) *error = std::abs(*error);
-    return error;
+    return SizeOf(ComError(plan, message.com_position, axis));
   });
 }
 
@@ -131,10 +131,8 @@ void AddMotion(MetricList* list) {
             BodyRotationOnBothFeet(false));
   for (size_t foot = 0; foot < 2; ++foot) {
     for (int axis = 0; axis < 3; ++axis) {
-      const auto error = [foot, axis](const auto& plan, const auto& planner) -> Answer {
-        if (plan.in_contact[foot] != 0) return {};
-        return std::abs(planner.foot_pose[foot].position[axis] -
-                        plan.foot_reference[foot].position[axis]);
+      const auto error = [foot, axis](const auto& plan, const auto& planner) {
+        return SizeOf(FootError(plan, planner, foot, axis));
       };
       list->Add(fmt::format("{}_foot_error_max_{}", kFoot[foot], kAxis[axis]), "mm",
                 fmt::format("largest distance of the {} foot from its reference while off the "

@@ -18,8 +18,6 @@ double TrueTouchLoad() { return ContactConfirmation().touch_load(); }
 double NoLoad() { return ReleaseLoad(ContactConfirmation()); }
 constexpr double kWrenchNeesBound = 21.026;  // chi-squared, 12 degrees of freedom, 5 %
 
-using Wrench = Eigen::Matrix<double, 6, 1>;
-
 double WeightOf(const RunRecord& run) { return run.robot.total_mass() * robot::kGravity; }
 
 struct Compared {
@@ -96,17 +94,12 @@ Compute MeanBefore(bool end, Signal signal) {
   return [=](const RunRecord& run) -> Answer {
     const double time = end ? run.time(run.num_ticks) : kCalibrated;
     const auto value = ByTick(signal, run);
-    double sum = 0;
-    int64_t count = 0;
+    Mean mean;
     for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
       if (run.time(tick) > time || run.time(tick) < time - kAveraged) continue;
-      if (const Answer v = value(tick)) {
-        sum += *v;
-        ++count;
-      }
+      if (const Answer v = value(tick)) mean.Add(*v);
     }
-    if (count == 0 || run.time(run.num_ticks) < time) return {};
-    return sum / static_cast<double>(count);
+    return run.time(run.num_ticks) < time ? Answer() : mean.Value();
   };
 }
 

@@ -103,12 +103,12 @@ Answer FastestStride(const RunRecord& run) {
 
 /// mm/s.
 Answer VelocityError(const RunRecord& run) {
-  MeanSquare square;
+  Mean squares;
   for (const Stride& stride : Strides(run)) {
     if (!stride.planned) continue;
-    square.Add(((stride.way - stride.commanded) / stride.duration).squaredNorm());
+    squares.Add(((stride.way - stride.commanded) / stride.duration).squaredNorm());
   }
-  return Scaled(square.Root(), kMilli);
+  return Scaled(squares.Root(), kMilli);
 }
 
 /// %, of what is commanded, that is followed; none where nothing is.

@@ -13,13 +13,13 @@ namespace {
 template <class Square>
 Compute WrenchErrorRms(std::vector<int> feet, Square square) {
   return [=](const RunRecord& run) {
-    MeanSquare mean;
+    Mean squares;
     for (int64_t t = run.first_tick; t < run.num_ticks; ++t) {
       for (const int foot : feet) {
-        if (const auto e = WrenchError(run, foot, t)) mean.Add(square(*e));
+        if (const auto e = WrenchError(run, foot, t)) squares.Add(square(*e));
       }
     }
-    return mean.Root();
+    return squares.Root();
   };
 }
 
@@ -42,11 +42,11 @@ std::optional<ForceErrors> BothForceErrors(const RunRecord& run, int64_t tick) {
 void AddInternalError(MetricList* list) {
   const auto add = [&](const char* name, const char* text, auto square) {
     list->Add(name, "N", text, [square](const RunRecord& run) {
-      MeanSquare mean;
+      Mean squares;
       for (int64_t t = run.first_tick; t < run.num_ticks; ++t) {
-        if (const auto e = BothForceErrors(run, t)) mean.Add(square(*e));
+        if (const auto e = BothForceErrors(run, t)) squares.Add(square(*e));
       }
-      return mean.Root();
+      return squares.Root();
     });
   };
   add("foot_force_error_internal_rms",

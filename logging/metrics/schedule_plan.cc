@@ -89,19 +89,19 @@ PhasePlan ReadPhase(const Reader& phase) {
 }
 
 /// Sets what follows each phase that is done: the one it names, else the one after it in the list.
-void LinkPhases(const Reader& config, SchedulePlan* plan) {
+void LinkPhases(const Reader& config, std::vector<PhasePlan>* phases) {
   constexpr int kDone = 1;  // the schema's first outcome
   const int count = config.Size("phase");
   for (int i = 0; i < count; ++i) {
     const Reader phase = config.Element("phase", i);
-    int& next = plan->phases[static_cast<size_t>(i)].next;
+    int& next = (*phases)[static_cast<size_t>(i)].next;
     if (!phase.Has("duration")) continue;
     if (i + 1 < count) next = i + 1;
     for (int k = 0; k < phase.Size("next"); ++k) {
       const Reader named = phase.Element("next", k);
       if (named.Enum("on") != kDone) continue;
       for (int j = 0; j < count; ++j) {
-        if (plan->phases[static_cast<size_t>(j)].name == named.Text("to")) next = j;
+        if ((*phases)[static_cast<size_t>(j)].name == named.Text("to")) next = j;
       }
     }
   }
@@ -150,16 +150,16 @@ std::vector<WalkOrder> OrdersOf(const Reader& walk) {
 
 }  // namespace
 
-std::optional<SchedulePlan> ReadSchedulePlan(const RunRecord& run) {
+std::optional<std::vector<PhasePlan>> ReadSchedulePlan(const RunRecord& run) {
   const std::unique_ptr<Message> message = PlannerConfig(run);
   if (message == nullptr) return {};  // the figures of such a log stand without the plan
   const Reader reader(*message);
-  SchedulePlan plan;
+  std::vector<PhasePlan> phases;
   for (int i = 0; i < reader.Size("phase"); ++i) {
-    plan.phases.push_back(ReadPhase(reader.Element("phase", i)));
+    phases.push_back(ReadPhase(reader.Element("phase", i)));
   }
-  LinkPhases(reader, &plan);
-  return plan;
+  LinkPhases(reader, &phases);
+  return phases;
 }
 
 std::vector<WalkOrder> ReadWalkOrders(const RunRecord& run) {

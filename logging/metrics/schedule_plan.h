@@ -18,6 +18,7 @@ struct FootPlan {
   bool at_once = false;  ///< a step: the reference stands at its end from the phase's first tick
 };
 
+/// A phase of the schedule.
 struct PhasePlan {
   std::string name;
   bool double_support = false;
@@ -25,14 +26,10 @@ struct PhasePlan {
   int next = -1;  ///< phase that follows when this one is done; -1: none
 };
 
-struct SchedulePlan {
-  std::vector<PhasePlan> phases;
-};
-
 /// Reads the schedule of the component that writes SUPPORT_PLAN. Empty when the run names no such
 /// configuration, when it does not fit this version's schema, or when the program does not link
 /// that schema: logging knows it by name only, since it includes no component's folder.
-std::optional<SchedulePlan> ReadSchedulePlan(const RunRecord& run);
+std::optional<std::vector<PhasePlan>> ReadSchedulePlan(const RunRecord& run);
 
 /// A velocity that is to be walked from a time on, and once so many steps have begun.
 struct WalkOrder {

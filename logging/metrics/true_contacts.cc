@@ -23,14 +23,6 @@ Eigen::Vector3d Up(const ground_truth_t& truth) {
   return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).conjugate() * Eigen::Vector3d::UnitZ();
 }
 
-/// The truth at time 0, or where a part of a run begins; nullptr: there is none.
-const ground_truth_t* Start(const RunRecord& run) {
-  for (const auto& [tick, truth] : Messages(run.truth, run.spec.lead_ticks(), run.num_ticks)) {
-    return truth;
-  }
-  return nullptr;
-}
-
 /// m, world, of a sole.
 std::optional<Eigen::Vector2d> Place(const RunRecord& run, size_t foot, int64_t tick) {
   const ground_truth_t* const truth = run.truth.at(tick);
@@ -53,22 +45,24 @@ bool Carries(const RunRecord& run, const std::vector<Interval>& off, int64_t tic
   });
 }
 
-/// What IsDown compares with, found once.
+/// What IsDown compares with, found once: the truth at time 0, or where a part of a run begins.
 class Stance {
  public:
-  explicit Stance(const RunRecord& run) {
-    const ground_truth_t* const start = Start(run);
-    if (start == nullptr) return;
-    up_ = Up(*start);
-    height_ = ComHeight(*start);
+  explicit Stance(const RunRecord& run) : lead_ticks_(run.spec.lead_ticks()) {
+    for (const auto& [tick, start] : Messages(run.truth, lead_ticks_, run.num_ticks)) {
+      up_ = Up(*start);
+      height_ = ComHeight(*start);
+      return;
+    }
   }
-  bool Left(const ground_truth_t& truth) const {
+  bool Left(int64_t tick, const ground_truth_t& truth) const {
     if (truth.fallen != 0) return true;
-    if (!(height_ > kLeastHeight)) return false;
+    if (tick < lead_ticks_ || !(height_ > kLeastHeight)) return false;
     return Up(truth).dot(up_) < std::cos(kDownTilt) || ComHeight(truth) < kDownShare * height_;
   }
 
  private:
+  int64_t lead_ticks_;
   Eigen::Vector3d up_ = Eigen::Vector3d::UnitZ();
   double height_ = 0;
 };
@@ -85,14 +79,13 @@ std::optional<bool> IsDown(const RunRecord& run, int64_t tick) {
   const ground_truth_t* const now = run.truth.at(tick);
   if (now == nullptr) return {};
   const ground_truth_t truth = *now;  // of a paged series, whose others are read meanwhile
-  if (tick < run.spec.lead_ticks()) return truth.fallen != 0;
-  return Stance(run).Left(truth);
+  return Stance(run).Left(tick, truth);
 }
 
 std::optional<int64_t> DownTick(const RunRecord& run) {
   const Stance stance(run);
   for (const auto& [tick, truth] : Messages(run.truth, 0, run.num_ticks)) {
-    if (tick < run.spec.lead_ticks() ? truth->fallen != 0 : stance.Left(*truth)) return tick;
+    if (stance.Left(tick, *truth)) return tick;
   }
   return {};
 }

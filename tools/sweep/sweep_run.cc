@@ -102,10 +102,9 @@ std::string PhaseAtEnd(const logging::RunRecord& run) {
   const planner_status_t* planner = run.planner.at(run.num_ticks - 1);
   if (planner == nullptr) return "";
   const auto phase = static_cast<size_t>(planner->phase);
-  const std::optional<logging::SchedulePlan> schedule = logging::ReadSchedulePlan(run);
-  const bool named =
-      schedule && phase < schedule->phases.size() && !schedule->phases[phase].name.empty();
-  return named ? schedule->phases[phase].name : std::to_string(planner->phase);
+  const auto schedule = logging::ReadSchedulePlan(run);
+  const bool named = schedule && phase < schedule->size() && !(*schedule)[phase].name.empty();
+  return named ? (*schedule)[phase].name : std::to_string(planner->phase);
 }
 
 void ReadEvents(const logging::RunRecord& run, SweepRow* row) {
