@@ -1,5 +1,7 @@
 #include "logging/replay/compare.h"
 
+#include <algorithm>
+#include <array>
 #include <map>
 #include <span>
 #include <utility>
@@ -14,31 +16,30 @@
 namespace poise::logging {
 namespace {
 
-/// Messages by tick and channel index; the spans live as long as the reader.
-struct MessagesByTick {
-  LogReader reader;
-  RunSpec spec;
-  std::map<std::pair<int64_t, int>, std::span<const uint8_t>> by_tick;
+/// The messages of both logs by tick and channel index, as long as their readers live; empty: there
+/// is none.
+using MessagePairs = std::map<std::pair<int64_t, int>, std::array<std::span<const uint8_t>, 2>>;
 
-  explicit MessagesByTick(const std::string& path) : reader(path) {
-    spec = FindRunInfo(&reader, path).spec;
-    std::map<std::string, int, std::less<>> index;
-    for (int i = 0; i < spec.graph().channel_size(); ++i) {
-      const Channel& channel = spec.graph().channel(i);
-      if (!channel.external()) index[channel.name()] = i;
-    }
-    LogEvent event;
-    while (reader.Next(&event)) {
-      const auto channel = index.find(event.channel);
-      if (channel == index.end()) continue;
-      const MessageType* type = FindMessageType(spec.graph().channel(channel->second).type());
-      const auto header_end = static_cast<size_t>(type->run_id_offset) + 24;
-      if (event.data.size() < header_end) continue;
-      const int64_t tick = ReadInt64(event.data.data() + type->run_id_offset + 8);
-      by_tick.try_emplace({tick, channel->second}, event.data);
-    }
+/// Adds those of `log`, 0 or 1, and returns its run.
+RunSpec Collect(LogReader* reader, const std::string& path, size_t log, MessagePairs* to) {
+  RunSpec spec = FindRunInfo(reader, path).spec;
+  std::map<std::string, int, std::less<>> index;
+  for (int i = 0; i < spec.graph().channel_size(); ++i) {
+    const Channel& channel = spec.graph().channel(i);
+    if (!channel.external()) index[channel.name()] = i;
   }
-};
+  LogEvent event;
+  while (reader->Next(&event)) {
+    const auto channel = index.find(event.channel);
+    if (channel == index.end()) continue;
+    const MessageType& type = ChannelType(spec.graph().channel(channel->second));
+    if (event.data.size() < static_cast<size_t>(type.run_id_offset) + 24) continue;
+    const int64_t tick = ReadInt64(event.data.data() + type.run_id_offset + 8);
+    std::span<const uint8_t>& place = (*to)[{tick, channel->second}][log];
+    if (place.empty()) place = event.data;
+  }
+  return spec;
+}
 
 void DescribeField(const MessageType& type, std::span<const uint8_t> a, std::span<const uint8_t> b,
                    LogDifference* difference) {
@@ -55,52 +56,38 @@ void DescribeField(const MessageType& type, std::span<const uint8_t> a, std::spa
 }  // namespace
 
 LogComparison CompareLogs(const std::string& first, const std::string& second) {
-  const MessagesByTick a(first);
-  const MessagesByTick b(second);
-  const auto& graph = a.spec.graph();
-  bool same_channels = graph.channel_size() == b.spec.graph().channel_size();
-  for (int i = 0; same_channels && i < graph.channel_size(); ++i) {
-    same_channels = graph.channel(i).name() == b.spec.graph().channel(i).name() &&
-                    graph.channel(i).type() == b.spec.graph().channel(i).type();
-  }
-  if (!same_channels) {
+  MessagePairs messages;
+  LogReader reader_a(first);
+  const RunSpec a = Collect(&reader_a, first, 0, &messages);
+  LogReader reader_b(second);
+  const RunSpec b = Collect(&reader_b, second, 1, &messages);
+  const auto same = [](const Channel& x, const Channel& y) {
+    return x.name() == y.name() && x.type() == y.type();
+  };
+  if (!std::ranges::equal(a.graph().channel(), b.graph().channel(), same)) {
     throw LogError(fmt::format("{} and {}: their graphs have different channels", first, second));
   }
 
   LogComparison result;
-  const auto note = [&](LogDifference difference) {
-    if (!result.earliest) result.earliest = std::move(difference);
-  };
-  auto i = a.by_tick.begin();
-  auto j = b.by_tick.begin();
   int64_t last_tick = -1;
-  while (i != a.by_tick.end() || j != b.by_tick.end()) {
-    const bool take_a = j == b.by_tick.end() || (i != a.by_tick.end() && i->first <= j->first);
-    const bool take_b = i == a.by_tick.end() || (j != b.by_tick.end() && j->first <= i->first);
-    const auto [tick, index] = take_a ? i->first : j->first;
-    const Channel& channel = graph.channel(index);
-    if (take_a && take_b) {
+  for (const auto& [at, of] : messages) {
+    const auto& [tick, index] = at;
+    const Channel& channel = a.graph().channel(index);
+    LogDifference difference{tick, channel.name(), {}, {}, {}};
+    if (of[0].empty() || of[1].empty()) {
+      const bool only_first = of[1].empty();
+      ++(only_first ? result.only_first : result.only_second);
+      difference.first = only_first ? "present" : "absent";
+      difference.second = only_first ? "absent" : "present";
+    } else {
       ++result.messages;
       result.ticks += tick != last_tick ? 1 : 0;
       last_tick = tick;
-      const MessageType& type = *FindMessageType(channel.type());
-      if (!SameBits(type, i->second, j->second)) {
-        ++result.differing;
-        if (!result.earliest) {
-          LogDifference difference{tick, channel.name(), {}, {}, {}};
-          DescribeField(type, i->second, j->second, &difference);
-          note(std::move(difference));
-        }
-      }
-    } else if (take_a) {
-      ++result.only_first;
-      note({tick, channel.name(), "", "present", "absent"});
-    } else {
-      ++result.only_second;
-      note({tick, channel.name(), "", "absent", "present"});
+      if (SameBits(ChannelType(channel), of[0], of[1])) continue;
+      ++result.differing;
+      if (!result.earliest) DescribeField(ChannelType(channel), of[0], of[1], &difference);
     }
-    if (take_a) ++i;
-    if (take_b) ++j;
+    if (!result.earliest) result.earliest = std::move(difference);
   }
   return result;
 }
