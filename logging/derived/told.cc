@@ -18,8 +18,8 @@ constexpr wrench_t kNoWrench{{kNone, kNone, kNone}, {kNone, kNone, kNone}};
 
 // Each returns whether it has left out anything.
 
-template <class Message>
-bool LeaveOutSensors(Message* message) {
+template <class Message>  // with feet's sensors
+bool LeaveOut(Message* message) {
   bool any = false;
   for (size_t f = 0; f < message->foot_sensor.size(); ++f) {
     if (message->foot_sensor[f] == drive_feedback_t::SENSOR_OK) continue;
@@ -28,8 +28,6 @@ bool LeaveOutSensors(Message* message) {
   }
   return any;
 }
-bool LeaveOut(robot_sensors_t* message) { return LeaveOutSensors(message); }
-bool LeaveOut(drive_feedback_t* message) { return LeaveOutSensors(message); }
 
 bool LeaveOut(joint_command_t* message) {
   bool told[2] = {false, false}, any = false;

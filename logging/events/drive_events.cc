@@ -1,9 +1,10 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "fmt/format.h"
@@ -125,32 +126,30 @@ std::string NegativeGain(const RunRecord& run, int64_t tick) {
 void AddMotorEvents(const RunRecord& run, EventList* events) {
   const size_t joints = run.robot.joints().size();
   const auto gap = static_cast<int64_t>(std::ceil(kLimitGap / run.spec.tick_period()));
-  std::array<std::vector<std::vector<Interval>>, std::size(kMotorLimits)> limited;
-  limited.fill(std::vector<std::vector<Interval>>(joints));
+  std::map<std::pair<size_t, size_t>, std::vector<Interval>> limited;  // by limit and joint
   for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
     const bridge_status_t* const bridge = run.bridge.at(tick);
     if (bridge == nullptr || bridge->state != bridge_status_t::STATE_RUNNING) continue;
     for (size_t joint = 0; joint < joints; ++joint) {
       if (bridge->saturated[joint] == 0) continue;
-      for (size_t i = 0; i < limited.size(); ++i) {
+      for (size_t i = 0; i < std::size(kMotorLimits); ++i) {
         const int bit = kMotorLimits[i].bit;
         if ((bridge->saturated[joint] & bit) == 0) continue;
         if (bit == bridge_status_t::LIMIT_IMPEDANCE && IsRounding(run, tick, joint)) continue;
-        std::vector<Interval>& intervals = limited[i][joint];
+        std::vector<Interval>& intervals = limited[{i, joint}];
         if (intervals.empty() || tick - *intervals.back().end > gap)
           intervals.push_back({tick, {}});
         intervals.back().end = tick + 1;
       }
     }
   }
-  for (size_t i = 0; i < limited.size(); ++i) {
+  for (auto& [of, intervals] : limited) {
+    const auto [i, joint] = of;
     const MotorLimit& limit = kMotorLimits[i];
-    for (size_t joint = 0; joint < joints; ++joint) {
-      for (Interval& interval : limited[i][joint]) {
-        if (*interval.end == run.num_ticks) interval.end.reset();
-        events->Add(interval.begin, limit.begins, LimitedText(run, joint, limit, interval));
-        events->AddEndOf(interval, limit.ends, run.robot.joints()[joint].name);
-      }
+    for (Interval& interval : intervals) {
+      if (*interval.end == run.num_ticks) interval.end.reset();
+      events->Add(interval.begin, limit.begins, LimitedText(run, joint, limit, interval));
+      events->AddEndOf(interval, limit.ends, run.robot.joints()[joint].name);
     }
   }
 }

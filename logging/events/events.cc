@@ -14,7 +14,6 @@
 #include "logging/events/event_groups.h"
 #include "logging/events/operator_words.h"
 #include "logging/metrics/analysis.h"
-#include "logging/metrics/push_noise.h"
 #include "logging/metrics/true_contacts.h"
 
 namespace poise::logging {

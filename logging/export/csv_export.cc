@@ -116,22 +116,6 @@ bool IsFileName(std::string_view name) {
          std::string_view::npos;
 }
 
-/// The results by channel, in the order in which the channels first come.
-class Results {
- public:
-  ExportedChannel& of(std::string_view channel) {
-    const auto found = std::find_if(channels_.begin(), channels_.end(),
-                                    [&](const auto& c) { return c.channel == channel; });
-    if (found != channels_.end()) return *found;
-    channels_.push_back({std::string(channel), "", 0, 0});
-    return channels_.back();
-  }
-  std::vector<ExportedChannel> take() { return std::move(channels_); }
-
- private:
-  std::vector<ExportedChannel> channels_;
-};
-
 /// Where the messages of each tick stand in a log, in memory that does not grow with ticks that
 /// come one after the other.
 class TickPlaces {
@@ -209,13 +193,17 @@ std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string
   std::map<std::string, Table, std::less<>> tables;
   Json units = Json::object();
   CheckedFile units_file((fs::path(folder) / kUnitsFile).string());
-  Results results;
+  std::vector<ExportedChannel> results;
   DerivedReader events(&messages.reader(), messages);
   LogEvent event;
   std::string row;
   while (events.Next(&event)) {
     if (event.channel == kRunInfoChannel) continue;
-    ExportedChannel& result = results.of(event.channel);
+    auto found = std::ranges::find(results, event.channel, &ExportedChannel::channel);
+    if (found == results.end()) {
+      found = results.insert(found, {std::string(event.channel), "", 0, 0});
+    }
+    ExportedChannel& result = *found;
     const MessageType* const type = messages.TypeOf(event);
     if (type == nullptr || !IsFileName(event.channel)) {
       ++result.refused;
@@ -258,7 +246,7 @@ std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string
   for (auto& [name, table] : tables) table.file.Close();
   WriteUnits(units, &units_file);
   units_file.Close();
-  return results.take();
+  return results;
 }
 
 std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::string& file) {

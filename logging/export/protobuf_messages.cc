@@ -21,12 +21,6 @@ namespace {
 
 namespace pb = google::protobuf;
 
-/// The integers of 32 bits and less that LCM has.
-bool IsInt32(std::string_view type) {
-  return type == "int8_t" || type == "byte" || type == "boolean" || type == "int16_t" ||
-         type == "int32_t";
-}
-
 bool IsArray(const FieldInfo& field) { return *field.count != '\0' || field.length > 0; }
 
 /// Makes the file of all types.
@@ -75,16 +69,14 @@ std::string FieldName(const std::string& name, std::set<std::string>* taken) {
 
 void SchemaBuilder::SetType(const std::string& type, pb::FieldDescriptorProto* field) {
   using Field = pb::FieldDescriptorProto;
-  if (IsInt32(type)) {
-    field->set_type(Field::TYPE_INT32);
-  } else if (type == "int64_t") {
-    field->set_type(Field::TYPE_INT64);
-  } else if (type == "double") {
-    field->set_type(Field::TYPE_DOUBLE);
-  } else if (type == "float") {
-    field->set_type(Field::TYPE_FLOAT);
-  } else if (type == "string") {
-    field->set_type(Field::TYPE_STRING);
+  static const std::map<std::string_view, Field::Type> scalars = {
+      {"int8_t", Field::TYPE_INT32},  {"byte", Field::TYPE_INT32},
+      {"boolean", Field::TYPE_INT32}, {"int16_t", Field::TYPE_INT32},
+      {"int32_t", Field::TYPE_INT32}, {"int64_t", Field::TYPE_INT64},
+      {"float", Field::TYPE_FLOAT},   {"double", Field::TYPE_DOUBLE},
+      {"string", Field::TYPE_STRING}};
+  if (const auto scalar = scalars.find(type); scalar != scalars.end()) {
+    field->set_type(scalar->second);
   } else {
     AddStruct(type);
     field->set_type(Field::TYPE_MESSAGE);

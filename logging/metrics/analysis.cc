@@ -179,6 +179,26 @@ std::optional<bool> Violated(const RunRecord& run, int64_t tick) {
   return false;
 }
 
+double PushThreshold(const RunRecord& run) {
+  constexpr double kDeviations = 6;  // of a norm of three: beyond it once in 10^7 samples
+  constexpr size_t kFewest = 10;     // differences
+  // The norm of three normal variables of deviation 1 has this median; a difference of two, √2 of
+  // it.
+  const double median_of_difference = 1.5382 * std::sqrt(2.0);
+  std::vector<double> differences;
+  for (int64_t tick = 1; tick < run.num_ticks; ++tick) {
+    const external_push_t* before = run.push.at(tick - 1);
+    if (before == nullptr) continue;
+    const Eigen::Vector3d force = GetVector3(before->force);  // of a paged series
+    const external_push_t* now = run.push.at(tick);
+    if (now != nullptr) differences.push_back((GetVector3(now->force) - force).norm());
+  }
+  if (differences.size() < kFewest) return HUGE_VAL;
+  const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
+  std::ranges::nth_element(differences, middle);
+  return kDeviations * *middle / median_of_difference;
+}
+
 Eigen::MatrixXd FromTriangle(const double* triangle, int size) {
   Eigen::MatrixXd matrix(size, size);
   for (int row = 0; row < size; ++row) {

@@ -111,6 +111,11 @@ balance::ConvexPolygon AcceptableRegion(const balance_torque_t& balance);
 /// there is BALANCE_TORQUE. Empty where the command tells of no foot.
 std::optional<bool> Violated(const RunRecord& run, int64_t tick);
 
+/// N, below which a reading of the sensor between pusher and robot is noise: six of the sensor's
+/// deviations, which the record itself tells by the median difference between neighbouring samples,
+/// which a push does not touch. Infinite of a run with too few samples to tell.
+double PushThreshold(const RunRecord& run);
+
 /// Returns the symmetric matrix of `size` rows whose upper triangle stands in `triangle` by rows.
 Eigen::MatrixXd FromTriangle(const double* triangle, int size);
 /// Returns eᵀ P⁻¹ e; nothing where P is not positive definite.

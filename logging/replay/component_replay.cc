@@ -382,7 +382,7 @@ class ReplayedStages {
   ChangedMessages* changed_;
   ActInput* act_input_ = nullptr;
   std::vector<PlacedAct> placed_acts_;  // by tick
-  SharedObjects shared_;  // of its own, as in a process
+  SharedObjects shared_;                // of its own, as in a process
   ConfiguredComponent component_;
   std::vector<BoundStage> stages_;
   RunPosition own_position_;
