@@ -12,13 +12,10 @@ namespace poise::logging {
 namespace {
 
 bool IsPart(std::string_view type) {
-  static const std::set<std::string_view> parts = [] {
-    std::set<std::string_view> names;
-    TickMessages().VisitMessages(
-        [&]<class T>(std::optional<T>&) { names.insert(MessageTraits<T>::kName); });
-    return names;
-  }();
-  return parts.contains(type);
+  bool part = false;
+  TickView().VisitMessages(
+      [&]<class T>(const T*&) { part = part || type == MessageTraits<T>::kName; });
+  return part;
 }
 
 }  // namespace

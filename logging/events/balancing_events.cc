@@ -59,11 +59,7 @@ void AddBalancing(const RunRecord& run, EventList* events) {
   events->AddIntervals(Intervals(run, not_achieved), "cop_not_achieved_begins",
                        "cop_not_achieved_ends",
                        [&](int64_t tick) { return NotAchievedText(*run.balance.at(tick)); });
-  const auto infeasible = [&](int64_t tick) -> std::optional<bool> {
-    const joint_command_t* command = run.command.at(tick);
-    if (command == nullptr || !TellsRatio(*command)) return {};
-    return command->eta_feasible == 0;
-  };
+  const auto infeasible = OfTick(run.command, RatioIsInfeasible);
   events->AddIntervals(Intervals(run, infeasible), "eta_infeasible_begins", "eta_infeasible_ends",
                        [&](int64_t tick) {
                          return fmt::format("no ratio meets all conditions; eta {:.3f}",

@@ -25,24 +25,18 @@ constexpr double kPushGap = 0.05;
 // An operator's act that is refused sooner than this after one like it is the same attempt, s.
 constexpr double kRefusalGap = 1;
 
-Answer PushForce(const RunRecord& run, int64_t tick) {
-  const external_push_t* push = run.push.at(tick);
-  if (push == nullptr) return {};
-  return GetVector3(push->force).norm();
-}
-
 void AddPush(const RunRecord& run, bool ended, EventList* events) {
   const double threshold = PushThreshold(run);
-  const auto pushed = [&](int64_t tick) -> std::optional<bool> {
-    const Answer force = PushForce(run, tick);
-    if (!force) return {};
-    return *force > threshold;
-  };
+  const auto size_at =
+      OfTick(run.push, [](const external_push_t& push) { return GetVector3(push.force).norm(); });
+  const auto pushed = OfTick(run.push, [&](const external_push_t& push) {
+    return GetVector3(push.force).norm() > threshold;
+  });
   const auto gap = static_cast<int64_t>(std::ceil(kPushGap / run.spec.tick_period()));
   for (const Interval& interval : Intervals(run, pushed, gap)) {
     int64_t peak = interval.begin;
     for (int64_t tick = peak; tick < interval.end.value_or(run.num_ticks); ++tick) {
-      if (PushForce(run, tick).value_or(0) > *PushForce(run, peak)) peak = tick;
+      if (size_at(tick).value_or(0) > *size_at(peak)) peak = tick;
     }
     const Eigen::Vector3d force = GetVector3(run.push.at(peak)->force);
     events->Add(interval.begin, "push_begins", fmt::format("above {:.2g} N", threshold));

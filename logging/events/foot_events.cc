@@ -77,13 +77,11 @@ void AddSoleEvents(const RunRecord& run, EventList* events) {
   const auto gap = static_cast<int64_t>(std::ceil(kTipsGap / run.spec.tick_period()));
   for (size_t foot = 0; foot < 2; ++foot) {
     const balance::ConvexPolygon sole = balance::SolePolygon(run.robot.feet()[foot], 0);
-    const auto tips = [&](int64_t tick) -> std::optional<bool> {
-      const ground_truth_t* const truth = run.truth.at(tick);
-      if (truth == nullptr) return {};
-      const balance::Vector6d wrench = GetWrench(truth->foot_wrench[foot]);
-      if (truth->fallen != 0 || -wrench[2] < least) return false;
+    const auto tips = OfTick(run.truth, [&](const ground_truth_t& truth) {
+      const balance::Vector6d wrench = GetWrench(truth.foot_wrench[foot]);
+      if (truth.fallen != 0 || -wrench[2] < least) return false;
       return balance::SignedDistance(sole, balance::CenterOfPressure(wrench)) < kTipsDistance;
-    };
+    });
     std::vector<Interval> intervals = Intervals(run, tips, gap);
     std::erase_if(intervals, [&](const Interval& i) {
       return run.duration(i.end.value_or(run.num_ticks) - i.begin) < kLeastTipping;
@@ -92,9 +90,9 @@ void AddSoleEvents(const RunRecord& run, EventList* events) {
     events->AddIntervals(intervals, "sole_on_edge", "sole_on_edge_ends", [&](int64_t tick) {
       // The load told is the median: an impact of a tick or two carries nothing.
       std::vector<double> loads;
-      for (int64_t t = tick; t < std::min(tick + lasts, run.num_ticks); ++t) {
-        const ground_truth_t* const truth = run.truth.at(t);
-        if (truth != nullptr) loads.push_back(-truth->foot_wrench[foot].force[2]);
+      for (const auto& [t, truth] :
+           Messages(run.truth, tick, std::min(tick + lasts, run.num_ticks))) {
+        loads.push_back(-truth->foot_wrench[foot].force[2]);
       }
       const auto middle = loads.begin() + static_cast<std::ptrdiff_t>(loads.size() / 2);
       std::ranges::nth_element(loads, middle);

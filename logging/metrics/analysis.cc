@@ -121,24 +121,25 @@ Answer MotorTorque(const RunRecord& run, size_t joint, int64_t tick) {
       joint);
 }
 
-std::optional<Wrench> WrenchError(const RunRecord& run, int foot, int64_t tick) {
+std::optional<bool> RatioIsInfeasible(const joint_command_t& command) {
+  return TellsRatio(command) ? std::optional(command.eta_feasible == 0) : std::nullopt;
+}
+
+std::optional<Wrench> WrenchError(const RunRecord& run, size_t foot, int64_t tick) {
   const support_plan_t* plan = run.plan.at(tick - 1);
   const joint_command_t* command = run.command.at(tick - 1);
   if (plan == nullptr || command == nullptr) return {};
-  const auto f = static_cast<size_t>(foot);
-  if (plan->in_contact[f] == 0 || !TellsFoot(*command, f)) return {};
-  const auto wrench = KnownWrench(run, f, tick);
+  if (plan->in_contact[foot] == 0 || !TellsFoot(*command, foot)) return {};
+  const auto wrench = KnownWrench(run, foot, tick);
   if (!wrench) return {};
-  return *wrench - GetWrench(command->foot_wrench[f]);
+  return *wrench - GetWrench(command->foot_wrench[foot]);
 }
 
-Answer FootMargin(const RunRecord& run, int foot, int margin, int64_t tick) {
+Answer FootMargin(const RunRecord& run, size_t foot, size_t margin, int64_t tick) {
   const joint_command_t* command = run.command.at(tick);
-  const auto f = static_cast<size_t>(foot);
-  if (command == nullptr || command->in_contact[f] == 0 || !TellsFoot(*command, f)) return {};
-  const contact_margins_t& m = command->margins[f];
-  const std::array<double, 5> margins = {m.normal, m.friction, m.yaw, m.roll, m.pitch};
-  return margins[static_cast<size_t>(margin)];
+  if (command == nullptr || command->in_contact[foot] == 0 || !TellsFoot(*command, foot)) return {};
+  const contact_margins_t& m = command->margins[foot];
+  return std::array{m.normal, m.friction, m.yaw, m.roll, m.pitch}[margin];
 }
 
 balance::ConvexPolygon AcceptableRegion(const balance_torque_t& balance) {
@@ -153,12 +154,11 @@ std::optional<bool> Violated(const RunRecord& run, int64_t tick) {
   const joint_command_t* command = run.command.at(tick);
   if (command == nullptr) return {};
   bool tells = false;
-  for (int foot = 0; foot < command->num_feet; ++foot) {
-    const auto f = static_cast<size_t>(foot);
-    if (!TellsFoot(*command, f)) continue;
+  for (size_t foot = 0; foot < command->margins.size(); ++foot) {
+    if (!TellsFoot(*command, foot)) continue;
     tells = true;
-    if (command->conditions_met[f] == 0) return true;
-    for (int margin = 0; margin < 5; ++margin) {
+    if (command->conditions_met[foot] == 0) return true;
+    for (size_t margin = 0; margin < 5; ++margin) {
       const Answer m = FootMargin(run, foot, margin, tick);
       if (m && !(*m >= -kWrenchTolerance)) return true;
     }

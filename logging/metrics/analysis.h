@@ -95,13 +95,16 @@ Answer MotorTorque(const RunRecord& run, size_t joint, int64_t tick);
 /// and the run's first message does not say that it is absent. Feet without are observed.
 bool FeetHaveSensors(const RunRecord& run);
 
+/// Empty where the command does not tell of a ratio.
+std::optional<bool> RatioIsInfeasible(const joint_command_t& command);
+
 /// Reading at `tick` less the wrench computed for it (the tick before), robot on environment, sole
 /// frame; empty for a foot out of contact.
-std::optional<Wrench> WrenchError(const RunRecord& run, int foot, int64_t tick);
+std::optional<Wrench> WrenchError(const RunRecord& run, size_t foot, int64_t tick);
 
 /// Margin 0..4 (normal, friction, yaw, roll, pitch) of a foot's computed wrench; empty out of
 /// contact.
-Answer FootMargin(const RunRecord& run, int foot, int margin, int64_t tick);
+Answer FootMargin(const RunRecord& run, size_t foot, size_t margin, int64_t tick);
 
 /// Where the computed centre of pressure is kept, m, frame O; empty in a message without corners.
 balance::ConvexPolygon AcceptableRegion(const balance_torque_t& balance);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -78,13 +79,12 @@ Compute BodyRotationOnBothFeet(bool first) {
     const std::vector<Interval> intervals = Intervals(run, both);
     if (intervals.empty() || (!first && intervals.size() < 2)) return {};
     const Interval& interval = first ? intervals.front() : intervals.back();
-    const auto error = [&](int64_t t) -> Answer {
-      const task_torque_t* task = run.task.at(t);
-      const bool within = t >= interval.begin && t < interval.end.value_or(run.num_ticks);
-      if (task == nullptr || !within) return {};
-      return std::abs(task->body_orientation_error[0]);
-    };
-    return Scaled(Maximum(run, error), kMilli);
+    const int64_t end = interval.end.value_or(run.num_ticks);
+    Answer largest;
+    for (const auto& [t, task] : Messages(run.task, interval.begin, end)) {
+      largest = std::max(largest, Answer(std::abs(task->body_orientation_error[0])));
+    }
+    return Scaled(largest, kMilli);
   };
 }
 

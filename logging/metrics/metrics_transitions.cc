@@ -15,13 +15,6 @@ constexpr double kReadableShare = 0.01;
 // Figure 17 shows half a second after the switch; what moves before it is not its doing.
 constexpr double kBeforeSwitch = 0.05, kAfterSwitch = 0.5;  // s
 
-/// m, of a sole; empty without ground truth.
-Answer TrueHeight(const RunRecord& run, size_t foot, int64_t tick) {
-  const ground_truth_t* truth = run.truth.at(tick);
-  if (truth == nullptr) return {};
-  return truth->foot_pose[foot].position[2];
-}
-
 /// mm, from lowest to highest, of the foot that stops being a support, about that tick.
 Answer LiftMotion(const RunRecord& run) {
   const auto before = std::llround(kBeforeSwitch / run.spec.tick_period());
@@ -32,11 +25,11 @@ Answer LiftMotion(const RunRecord& run) {
     for (size_t foot = 0; foot < 2; ++foot) {
       if (!change.lifted(foot)) continue;
       Answer low, high;
-      for (int64_t t = change.tick - before; t <= change.tick + after; ++t) {
-        const Answer z = TrueHeight(run, foot, t);
-        if (!z) continue;
-        low = std::min(low.value_or(*z), *z);
-        high = std::max(high.value_or(*z), *z);
+      const int64_t begin = change.tick - before, end = change.tick + after + 1;
+      for (const auto& [t, truth] : Messages(run.truth, begin, end)) {
+        const double z = truth->foot_pose[foot].position[2];
+        low = std::min(low.value_or(z), z);
+        high = std::max(high.value_or(z), z);
       }
       if (low) largest = std::max(largest, Answer(kMilli * (*high - *low)));
     }
@@ -69,20 +62,19 @@ Answer Sink(const RunRecord& run, size_t foot) {
       break;
     }
   }
-  const Answer start = TrueHeight(run, foot, *stand);
+  const auto height =
+      OfTick(run.truth, [foot](const auto& truth) { return truth.foot_pose[foot].position[2]; });
+  const Answer start = height(*stand);
   if (!start) return {};
   double lowest = *start;
-  for (int64_t t = *stand; t < end; ++t) {
-    lowest = std::min(lowest, TrueHeight(run, foot, t).value_or(lowest));
-  }
+  for (int64_t t = *stand; t < end; ++t) lowest = std::min(lowest, height(t).value_or(lowest));
   return kMilli * (*start - lowest);
 }
 
 /// Roll (32) or pitch (33) of a sole: where its margin and its moment stand.
 struct Edge {
   const char* name;
-  int margin;
-  size_t moment;
+  size_t margin, moment;
 };
 constexpr Edge kEdges[] = {{"roll", 3, 0}, {"pitch", 4, 1}};
 
@@ -92,7 +84,7 @@ std::array<Answer, 2> SoleHalf(const RunRecord& run, size_t foot, const Edge& ed
   std::array<Answer, 2> half;
   std::array<double, 2> largest{};
   for (int64_t t = 0; t < run.num_ticks; ++t) {
-    const Answer margin = FootMargin(run, static_cast<int>(foot), edge.margin, t);
+    const Answer margin = FootMargin(run, foot, edge.margin, t);
     if (!margin) continue;
     const joint_command_t& command = *run.command.at(t);
     const size_t support = command.in_contact[0] != 0 && command.in_contact[1] != 0 ? 1 : 0;

@@ -11,11 +11,11 @@ namespace {
 
 /// Root of the mean square of measured less computed wrenches of `feet`, `square` of each.
 template <class Square>
-Compute WrenchErrorRms(std::vector<int> feet, Square square) {
+Compute WrenchErrorRms(std::vector<size_t> feet, Square square) {
   return [=](const RunRecord& run) {
     Mean squares;
     for (int64_t t = run.first_tick; t < run.num_ticks; ++t) {
-      for (const int foot : feet) {
+      for (const size_t foot : feet) {
         if (const auto e = WrenchError(run, foot, t)) squares.Add(square(*e));
       }
     }
@@ -67,7 +67,7 @@ void AddWrenchErrors(MetricList* list) {
             WrenchErrorRms({0, 1}, [](const W& e) { return e.tail<3>().squaredNorm(); }));
   AddInternalError(list);
   const auto add = [&](const char* name, const char* unit, const char* text, auto square) {
-    for (int foot = 0; foot < 2; ++foot) {
+    for (size_t foot = 0; foot < 2; ++foot) {
       list->Add(fmt::format("{}_foot_{}_error_rms", kFoot[foot], name), unit,
                 fmt::format("measured less computed {} of the {} foot, RMS", text, kFoot[foot]),
                 WrenchErrorRms({foot}, square));
@@ -118,12 +118,8 @@ void AddTangential(MetricList* list) {
 }
 
 void AddRatio(MetricList* list) {
-  const auto infeasible = [](const joint_command_t& command) -> std::optional<bool> {
-    if (!TellsRatio(command)) return {};
-    return command.eta_feasible == 0;
-  };
   list->Add("eta_infeasible_ticks", "", "ticks in which no ratio eta met all conditions",
-            TicksOf(Of(&RunRecord::command, infeasible)));
+            TicksOf(Of(&RunRecord::command, RatioIsInfeasible)));
   const auto eta = Of(&RunRecord::command, [](const auto& command) {
     return TellsRatio(command) ? Answer(command.eta) : Answer();
   });
@@ -147,8 +143,8 @@ void AddWrenches(MetricList* list) {
             TicksOf(Violated));
   AddRatio(list);
   constexpr const char* kMargin[] = {"normal", "friction", "yaw", "roll", "pitch"};
-  for (int foot = 0; foot < 2; ++foot) {
-    for (int margin = 0; margin < 5; ++margin) {
+  for (size_t foot = 0; foot < 2; ++foot) {
+    for (size_t margin = 0; margin < 5; ++margin) {
       list->Add(fmt::format("{}_foot_{}_margin", kFoot[foot], kMargin[margin]),
                 margin < 2 ? "N" : "N·m",
                 fmt::format("smallest margin of the {} foot's computed wrench, ({})", kFoot[foot],
