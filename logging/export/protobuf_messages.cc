@@ -23,36 +23,11 @@ namespace pb = google::protobuf;
 
 bool IsArray(const FieldInfo& field) { return *field.count != '\0' || field.length > 0; }
 
-/// Makes the file of all types.
-class SchemaBuilder {
- public:
-  SchemaBuilder(const ElementNames& names, pb::FileDescriptorProto* file)
-      : names_(names), file_(file) {}
-
-  void AddStruct(const std::string& type);
-
- private:
-  bool Has(const std::string& name) const;
-  void SetType(const std::string& type, pb::FieldDescriptorProto* field);
-  void AddField(const std::string& type, const FieldInfo& info, pb::DescriptorProto* message);
-  /// Adds the message of an array's named elements; returns its name, "joints_double".
-  std::string AddElements(const FieldInfo& info, const std::vector<std::string>& names);
-
-  const ElementNames& names_;
-  pb::FileDescriptorProto* file_;
-};
-
 /// The message of a struct: a package other than poise is a part of its name.
 std::string MessageName(std::string_view type) {
   std::string name(type);
   std::replace(name.begin(), name.end(), '.', '_');
   return name;
-}
-
-bool SchemaBuilder::Has(const std::string& name) const {
-  const auto& types = file_->message_type();
-  return std::any_of(types.begin(), types.end(),
-                     [&](const pb::DescriptorProto& other) { return other.name() == name; });
 }
 
 /// A name that Protobuf takes, of those in `taken` none.
@@ -67,68 +42,83 @@ std::string FieldName(const std::string& name, std::set<std::string>* taken) {
   return unique;
 }
 
-void SchemaBuilder::SetType(const std::string& type, pb::FieldDescriptorProto* field) {
-  using Field = pb::FieldDescriptorProto;
-  static const std::map<std::string_view, Field::Type> scalars = {
-      {"int8_t", Field::TYPE_INT32},  {"byte", Field::TYPE_INT32},
-      {"boolean", Field::TYPE_INT32}, {"int16_t", Field::TYPE_INT32},
-      {"int32_t", Field::TYPE_INT32}, {"int64_t", Field::TYPE_INT64},
-      {"float", Field::TYPE_FLOAT},   {"double", Field::TYPE_DOUBLE},
-      {"string", Field::TYPE_STRING}};
-  if (const auto scalar = scalars.find(type); scalar != scalars.end()) {
-    field->set_type(scalar->second);
-  } else {
-    AddStruct(type);
-    field->set_type(Field::TYPE_MESSAGE);
-    field->set_type_name("." + ProtobufMessages::FullName(type));
-  }
-}
+/// Makes the file of all types.
+class SchemaBuilder {
+ public:
+  SchemaBuilder(const ElementNames& names, pb::FileDescriptorProto* file)
+      : names_(names), file_(file) {}
 
-std::string SchemaBuilder::AddElements(const FieldInfo& info,
-                                       const std::vector<std::string>& names) {
-  constexpr std::string_view kCount = "num_";
-  pb::DescriptorProto message;
-  message.set_name(fmt::format("{}_{}", std::string_view(info.count).substr(kCount.size()),
-                               MessageName(info.type)));
-  if (Has(message.name())) return message.name();
-  std::set<std::string> taken;
-  for (const std::string& name : names) {
-    pb::FieldDescriptorProto* const field = message.add_field();
-    field->set_name(FieldName(name, &taken));
-    field->set_number(message.field_size());
-    field->set_label(pb::FieldDescriptorProto::LABEL_OPTIONAL);
+  void AddStruct(const std::string& type) {
+    if (Has(MessageName(type))) return;
+    pb::DescriptorProto message;
+    message.set_name(MessageName(type));
+    for (const FieldInfo& field : FieldsOf(type)) AddField(type, field, &message);
+    *file_->add_message_type() = std::move(message);
+  }
+
+ private:
+  bool Has(const std::string& name) const {
+    const auto& types = file_->message_type();
+    return std::ranges::find(types, name, &pb::DescriptorProto::name) != types.end();
+  }
+
+  void SetType(const std::string& type, pb::FieldDescriptorProto* field) {
+    using Field = pb::FieldDescriptorProto;
+    static const std::map<std::string_view, Field::Type> scalars = {
+        {"int8_t", Field::TYPE_INT32},  {"byte", Field::TYPE_INT32},
+        {"boolean", Field::TYPE_INT32}, {"int16_t", Field::TYPE_INT32},
+        {"int32_t", Field::TYPE_INT32}, {"int64_t", Field::TYPE_INT64},
+        {"float", Field::TYPE_FLOAT},   {"double", Field::TYPE_DOUBLE},
+        {"string", Field::TYPE_STRING}};
+    if (const auto scalar = scalars.find(type); scalar != scalars.end()) {
+      field->set_type(scalar->second);
+    } else {
+      AddStruct(type);
+      field->set_type(Field::TYPE_MESSAGE);
+      field->set_type_name("." + ProtobufMessages::FullName(type));
+    }
+  }
+
+  /// Adds the message of an array's named elements; returns its name, "joints_double".
+  std::string AddElements(const FieldInfo& info, const std::vector<std::string>& names) {
+    constexpr std::string_view kCount = "num_";
+    pb::DescriptorProto message;
+    message.set_name(fmt::format("{}_{}", std::string_view(info.count).substr(kCount.size()),
+                                 MessageName(info.type)));
+    if (Has(message.name())) return message.name();
+    std::set<std::string> taken;
+    for (const std::string& name : names) {
+      pb::FieldDescriptorProto* const field = message.add_field();
+      field->set_name(FieldName(name, &taken));
+      field->set_number(message.field_size());
+      field->set_label(pb::FieldDescriptorProto::LABEL_OPTIONAL);
+      SetType(info.type, field);
+    }
+    *file_->add_message_type() = message;
+    return message.name();
+  }
+
+  void AddField(const std::string& type, const FieldInfo& info, pb::DescriptorProto* message) {
+    using Field = pb::FieldDescriptorProto;
+    Field* const field = message->add_field();
+    field->set_name(info.name);
+    field->set_number(message->field_size());
+    const std::vector<std::string>& names = names_.Of(type, info.name);
+    if (!names.empty()) {
+      field->set_label(Field::LABEL_OPTIONAL);
+      field->set_type(Field::TYPE_MESSAGE);
+      field->set_type_name("." + ProtobufMessages::FullName(AddElements(info, names)));
+      return;
+    }
+    field->set_label(IsArray(info) ? Field::LABEL_REPEATED : Field::LABEL_OPTIONAL);
     SetType(info.type, field);
+    const bool number = field->type() != Field::TYPE_MESSAGE && field->type() != Field::TYPE_STRING;
+    if (IsArray(info) && number) field->mutable_options()->set_packed(true);
   }
-  *file_->add_message_type() = message;
-  return message.name();
-}
 
-void SchemaBuilder::AddField(const std::string& type, const FieldInfo& info,
-                             pb::DescriptorProto* message) {
-  using Field = pb::FieldDescriptorProto;
-  Field* const field = message->add_field();
-  field->set_name(info.name);
-  field->set_number(message->field_size());
-  const std::vector<std::string>& names = names_.Of(type, info.name);
-  if (!names.empty()) {
-    field->set_label(Field::LABEL_OPTIONAL);
-    field->set_type(Field::TYPE_MESSAGE);
-    field->set_type_name("." + ProtobufMessages::FullName(AddElements(info, names)));
-    return;
-  }
-  field->set_label(IsArray(info) ? Field::LABEL_REPEATED : Field::LABEL_OPTIONAL);
-  SetType(info.type, field);
-  const bool number = field->type() != Field::TYPE_MESSAGE && field->type() != Field::TYPE_STRING;
-  if (IsArray(info) && number) field->mutable_options()->set_packed(true);
-}
-
-void SchemaBuilder::AddStruct(const std::string& type) {
-  if (Has(MessageName(type))) return;
-  pb::DescriptorProto message;
-  message.set_name(MessageName(type));
-  for (const FieldInfo& field : FieldsOf(type)) AddField(type, field, &message);
-  *file_->add_message_type() = std::move(message);
-}
+  const ElementNames& names_;
+  pb::FileDescriptorProto* file_;
+};
 
 /// The scalars of a message, in the order of declaration.
 class Scalars final : public ScalarVisitor {
