@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 #include <vector>
 
@@ -60,10 +61,6 @@ std::vector<uint32_t> Quantise(std::span<const double> values, double step,
   return result;
 }
 
-void Difference(std::vector<uint32_t>* values) {
-  for (size_t i = values->size(); i-- > 1;) (*values)[i] -= (*values)[i - 1];
-}
-
 uint32_t Zigzag(uint32_t x) { return (x << 1) ^ (x >> 31 != 0 ? ~0u : 0u); }
 
 /// Bits that the values take without leading zeros: what deflate of byte planes roughly leaves.
@@ -100,7 +97,7 @@ PackedColumn Pack(std::vector<uint32_t> best, double step) {
   int64_t best_cost = Cost(best);
   std::vector<uint32_t> differences = best;
   for (int order = 1; order <= kMaxOrder; ++order) {
-    Difference(&differences);
+    std::adjacent_difference(differences.begin(), differences.end(), differences.begin());
     const int64_t cost = Cost(differences);
     if (cost >= best_cost) continue;
     best = differences;

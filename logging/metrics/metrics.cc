@@ -13,33 +13,24 @@ namespace {
 
 constexpr size_t kMostMetrics = 4096;
 
-MetricList MakeMetrics() {
-  MetricList list;
-  AddOutcome(&list);
-  AddMotion(&list);
-  AddBalancing(&list);
-  AddWrenches(&list);
-  AddTorques(&list);
-  AddDrives(&list);
-  AddTransitions(&list);
-  AddSensors(&list);
-  AddEstimator(&list);
-  AddObserver(&list);
-  AddStepping(&list);
-  AddWalking(&list);
-  AddLog(&list);
-  for (Metric& metric : list) metric.needs = NeedsOf(metric.name);
-  return list;
-}
-
-}  // namespace
-
-namespace {
-
 MetricList& Known() {
   static MetricList list = [] {
-    MetricList own = MakeMetrics();
+    MetricList own;
     own.reserve(kMostMetrics);  // pointers to them last
+    AddOutcome(&own);
+    AddMotion(&own);
+    AddBalancing(&own);
+    AddWrenches(&own);
+    AddTorques(&own);
+    AddDrives(&own);
+    AddTransitions(&own);
+    AddSensors(&own);
+    AddEstimator(&own);
+    AddObserver(&own);
+    AddStepping(&own);
+    AddWalking(&own);
+    AddLog(&own);
+    for (Metric& metric : own) metric.needs = NeedsOf(metric.name);
     return own;
   }();
   return list;
@@ -60,10 +51,8 @@ void AddMetric(Metric metric) {
 std::span<const Metric> Metrics() { return Known(); }
 
 const Metric* FindMetric(std::string_view name) {
-  const auto metrics = Metrics();
-  const auto metric =
-      std::find_if(metrics.begin(), metrics.end(), [&](const Metric& m) { return m.name == name; });
-  return metric == metrics.end() ? nullptr : &*metric;
+  const auto metric = std::ranges::find(Known(), name, &Metric::name);
+  return metric == Known().end() ? nullptr : &*metric;
 }
 
 std::string NoMetric(std::string_view name) {

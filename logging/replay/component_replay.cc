@@ -293,10 +293,9 @@ class ReplayedStages {
       }
     }
     if (lacking.empty()) return;
-    std::string text;
-    for (const std::string& line : lacking) text += (text.empty() ? "" : "; ") + line;
     const bool cut = spec_.cut().first_tick() > 0 || !spec_.cut().channel().empty();
-    Fail(text + (cut ? "; it is cut from a longer log, which may have it" : ""));
+    Fail(fmt::format("{}{}", fmt::join(lacking, "; "),
+                     cut ? "; it is cut from a longer log, which may have it" : ""));
   }
 
   void AddMissing(int channel, int64_t end, const char* purpose,
