@@ -62,11 +62,9 @@ bool IsRounding(const RunRecord& run, int64_t tick, size_t joint) {
 std::string CutText(const RunRecord& run, size_t joint, const Interval& interval) {
   const std::string& name = run.robot.joints()[joint].name;
   std::optional<ImpedanceCut> most;
-  for (int64_t tick = interval.begin; tick < interval.end.value_or(run.num_ticks); ++tick) {
-    const bridge_status_t* const bridge = run.bridge.at(tick);
-    if (bridge == nullptr || (bridge->saturated[joint] & bridge_status_t::LIMIT_IMPEDANCE) == 0) {
-      continue;
-    }
+  const int64_t end = interval.end.value_or(run.num_ticks);
+  for (const auto& [tick, bridge] : Messages(run.bridge, interval.begin, end)) {
+    if ((bridge->saturated[joint] & bridge_status_t::LIMIT_IMPEDANCE) == 0) continue;
     const std::optional<ImpedanceCut> cut = CutAt(run, tick, joint);
     if (cut && (!most || cut->share > most->share)) most = cut;
   }
@@ -86,9 +84,9 @@ std::string LimitedText(const RunRecord& run, size_t joint, const MotorLimit& li
       run.bridge, [&](const bridge_status_t& bridge) { return bridge.applied_torque[joint]; });
   double from = applied(interval.begin - 1).value_or(*applied(interval.begin)), to = from;
   Answer wanted;
-  for (int64_t tick = interval.begin; tick < interval.end.value_or(run.num_ticks); ++tick) {
-    const bridge_status_t* const bridge = run.bridge.at(tick);
-    if (bridge == nullptr || (bridge->saturated[joint] & limit.bit) == 0) continue;
+  const int64_t end = interval.end.value_or(run.num_ticks);
+  for (const auto& [tick, bridge] : Messages(run.bridge, interval.begin, end)) {
+    if ((bridge->saturated[joint] & limit.bit) == 0) continue;
     const double now = bridge->applied_torque[joint];
     // A cold motor is held at its largest torque, a hot one to ever less.
     const bool more = limit.bit == bridge_status_t::LIMIT_TORQUE
@@ -127,9 +125,8 @@ void AddMotorEvents(const RunRecord& run, EventList* events) {
   const size_t joints = run.robot.joints().size();
   const auto gap = static_cast<int64_t>(std::ceil(kLimitGap / run.spec.tick_period()));
   std::map<std::pair<size_t, size_t>, std::vector<Interval>> limited;  // by limit and joint
-  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const bridge_status_t* const bridge = run.bridge.at(tick);
-    if (bridge == nullptr || bridge->state != bridge_status_t::STATE_RUNNING) continue;
+  for (const auto& [tick, bridge] : Messages(run.bridge, 0, run.num_ticks)) {
+    if (bridge->state != bridge_status_t::STATE_RUNNING) continue;
     for (size_t joint = 0; joint < joints; ++joint) {
       if (bridge->saturated[joint] == 0) continue;
       for (size_t i = 0; i < std::size(kMotorLimits); ++i) {

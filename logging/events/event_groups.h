@@ -1,9 +1,12 @@
 // What the files of events add to: by concern, in the order of events.cc.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "logging/events/events.h"
@@ -37,9 +40,8 @@ class EventList {
     }
   }
   std::vector<Event> Sorted() && {
-    std::stable_sort(events_.begin(), events_.end(), [](const Entry& a, const Entry& b) {
-      return a.event.time < b.event.time || (a.event.time == b.event.time && a.ends && !b.ends);
-    });
+    std::ranges::stable_sort(
+        events_, {}, [](const Entry& entry) { return std::pair(entry.event.time, !entry.ends); });
     std::vector<Event> sorted;
     for (Entry& entry : events_) sorted.push_back(std::move(entry.event));
     return sorted;
