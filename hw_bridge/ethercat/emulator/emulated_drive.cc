@@ -36,7 +36,10 @@ EmulatedDrive::EmulatedDrive(const EmulatedDriveConfig& config, ObjectDictionary
   constexpr uint32_t kQuickStopSlowDown = 2;  // then switch on disabled
   const auto add = [&](uint16_t index, uint8_t size, uint8_t access, const char* name,
                        uint32_t value = 0) {
-    return Add(dictionary, index, size, access, name, value);
+    Object* const object =
+        (Lacks(index) ? &hidden_ : dictionary)->Add({index, 0}, size, access, value);
+    object->name = name;
+    return object;
   };
   controlword_ = add(object::kControlword, 2, kRx, "Controlword");
   statusword_ = add(object::kStatusword, 2, kTx, "Statusword");
@@ -60,12 +63,10 @@ EmulatedDrive::EmulatedDrive(const EmulatedDriveConfig& config, ObjectDictionary
   add(object::kSupportedModes, 4, kReadOnly, "Supported drive modes",
       1U << (kModeCyclicTorque - 1));
   // Interpolation time period: 2 x 10^-3 s.
-  const auto& lacking = config.lacks();
-  if (std::find(lacking.begin(), lacking.end(), 0x60C2U) == lacking.end()) {
-    dictionary->Add({0x60C2, 0}, 1, kReadOnly, 2);
+  if (!Lacks(0x60C2)) {
+    dictionary->Add({0x60C2, 0}, 1, kReadOnly, 2)->name = "Interpolation time period";
     dictionary->Add({0x60C2, 1}, 1, kRw, 2);
     dictionary->Add({0x60C2, 2}, 1, kRw, 0xFD)->is_signed = true;
-    dictionary->SetName(0x60C2, "Interpolation time period");
   }
   for (Object* object : {mode_, mode_display_, target_torque_, torque_object_, position_, velocity_,
                          target_position, target_velocity, quick_stop}) {
@@ -76,18 +77,12 @@ EmulatedDrive::EmulatedDrive(const EmulatedDriveConfig& config, ObjectDictionary
     return in_range(mode == 0 || mode == static_cast<uint32_t>(kModeCyclicTorque));
   };
   quick_stop->on_write = [in_range](uint32_t code) { return in_range(code <= 8 && code != 4); };
-  Schedule(DriveState::kSwitchOnDisabled, 0);
+  Schedule(DriveState::kSwitchOnDisabled);
   Report();
 }
 
-EmulatedDrive::Object* EmulatedDrive::Add(ObjectDictionary* objects, uint16_t index, uint8_t size,
-                                          uint8_t access, const char* name, uint32_t value) {
-  if (std::find(config_.lacks().begin(), config_.lacks().end(), index) != config_.lacks().end()) {
-    hidden_.push_back({.size = size, .access = access, .value = value});
-    return &hidden_.back();
-  }
-  objects->SetName(index, name);
-  return objects->Add({index, 0}, size, access, value);
+bool EmulatedDrive::Lacks(uint16_t index) const {
+  return std::ranges::find(config_.lacks(), index) != config_.lacks().end();
 }
 
 void EmulatedDrive::TriggerFault(uint16_t error) {
@@ -96,7 +91,7 @@ void EmulatedDrive::TriggerFault(uint16_t error) {
   error_register_->value = 1;  // a generic error
   emergency_ = error;
   Enter(DriveState::kFaultReactionActive);
-  Schedule(DriveState::kFault, now_);
+  Schedule(DriveState::kFault);
 }
 
 void EmulatedDrive::Enter(DriveState state) {
@@ -104,10 +99,10 @@ void EmulatedDrive::Enter(DriveState state) {
   next_.reset();
 }
 
-void EmulatedDrive::Schedule(DriveState state, int64_t now) {
+void EmulatedDrive::Schedule(DriveState state) {
   if (next_ == state) return;
   next_ = state;
-  next_time_ = now + static_cast<int64_t>(config_.transition_time() * kNanosecondsPerMs);
+  next_time_ = now_ + static_cast<int64_t>(config_.transition_time() * kNanosecondsPerMs);
 }
 
 void EmulatedDrive::AdvanceTo(int64_t now, bool outputs_valid) {
@@ -115,12 +110,12 @@ void EmulatedDrive::AdvanceTo(int64_t now, bool outputs_valid) {
       static_cast<double>(std::max<int64_t>(now - now_, 0)) / kNanosecondsPerMs;
   now_ = std::max(now, now_);
   load_->AdvanceTo(now_);
-  UpdateState(now_, outputs_valid);
+  UpdateState(outputs_valid);
   UpdateTorque(elapsed_ms);
   Report();
 }
 
-void EmulatedDrive::UpdateState(int64_t now, bool outputs_valid) {
+void EmulatedDrive::UpdateState(bool outputs_valid) {
   const auto controlword = static_cast<uint16_t>(controlword_->value);
   const bool reset_edge =
       (controlword & ~last_controlword_ & kControlFaultReset) != 0 && outputs_valid;
@@ -132,20 +127,20 @@ void EmulatedDrive::UpdateState(int64_t now, bool outputs_valid) {
   if (sto_ && (powered || state_ == DriveState::kReadyToSwitchOn)) {
     Enter(DriveState::kSwitchOnDisabled);
   }
-  if (next_ && now >= next_time_) Enter(*next_);
-  if (outputs_valid) Follow(controlword, reset_edge, now);
+  if (next_ && now_ >= next_time_) Enter(*next_);
+  if (outputs_valid) Follow(controlword, reset_edge);
   // Another mode is not supported: the drive stays in the one it has.
   const bool change = static_cast<int8_t>(mode_->value) == kModeCyclicTorque &&
                       mode_display_->value != mode_->value;
   if (!change) {
-    mode_wanted_at_ = now;
-  } else if (now - mode_wanted_at_ >=
+    mode_wanted_at_ = now_;
+  } else if (now_ - mode_wanted_at_ >=
              static_cast<int64_t>(config_.mode_time() * kNanosecondsPerMs)) {
     mode_display_->value = mode_->value;
   }
 }
 
-void EmulatedDrive::Follow(uint16_t controlword, bool reset_edge, int64_t now) {
+void EmulatedDrive::Follow(uint16_t controlword, bool reset_edge) {
   const DriveState asked = AskedFor(controlword);
   std::optional<DriveState> wanted;
   switch (state_) {
@@ -173,7 +168,7 @@ void EmulatedDrive::Follow(uint16_t controlword, bool reset_edge, int64_t now) {
       if (asked == DriveState::kSwitchOnDisabled) {
         Enter(asked);
       } else {
-        Schedule(DriveState::kSwitchOnDisabled, now);
+        Schedule(DriveState::kSwitchOnDisabled);
       }
       return;
     case DriveState::kFault:
@@ -189,7 +184,7 @@ void EmulatedDrive::Follow(uint16_t controlword, bool reset_edge, int64_t now) {
       return;  // left by themselves
   }
   if (wanted) {
-    Schedule(*wanted, now);
+    Schedule(*wanted);
   } else {
     next_.reset();
   }

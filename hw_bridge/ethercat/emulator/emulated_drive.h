@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <utility>
 
@@ -57,10 +56,11 @@ class EmulatedDrive {
   std::optional<uint16_t> TakeEmergency() { return std::exchange(emergency_, std::nullopt); }
 
  private:
-  void UpdateState(int64_t now, bool outputs_valid);
-  void Follow(uint16_t controlword, bool reset_edge, int64_t now);
+  bool Lacks(uint16_t index) const;
+  void UpdateState(bool outputs_valid);
+  void Follow(uint16_t controlword, bool reset_edge);
   void Enter(DriveState state);
-  void Schedule(DriveState state, int64_t now);
+  void Schedule(DriveState state);
   void UpdateTorque(double elapsed_ms);
   double TorqueLimit(double elapsed_ms);
   void Report();
@@ -73,11 +73,9 @@ class EmulatedDrive {
   EmulatedDriveConfig config_;
   MotorLoad* load_;
   using Object = ObjectDictionary::Object;
-  Object* Add(ObjectDictionary* objects, uint16_t index, uint8_t size, uint8_t access,
-              const char* name, uint32_t value = 0);
   Object *controlword_, *statusword_, *mode_, *mode_display_, *target_torque_, *max_torque_,
       *torque_object_, *position_, *velocity_, *error_code_, *error_register_;
-  std::deque<Object> hidden_;  // that the drive has, but not for a master
+  ObjectDictionary hidden_;  // what the drive has, but not for a master
 
   DriveState state_ = DriveState::kNotReadyToSwitchOn;
   std::optional<DriveState> next_;  // entered at next_time_

@@ -114,14 +114,13 @@ EmulatedEsc::SyncManagerSettings EmulatedEsc::sync_manager(int index) const {
           .active = (memory_[base + 6] & kSmEnable) != 0};
 }
 
-void EmulatedEsc::SetSyncManagerDisabled(int index, bool disabled) {
-  uint8_t& pdi = SyncByte(index, 7);
+void EmulatedEsc::SetOutputsDisabled(bool disabled) {
+  uint8_t& pdi = SyncByte(output_manager(), 7);
   pdi = static_cast<uint8_t>((pdi & ~kSmPdiDisable) | (disabled ? kSmPdiDisable : 0));
 }
 
-EmulatedEsc::Rule EmulatedEsc::SyncManagerRule(size_t address, size_t size, bool write,
-                                               int* manager) const {
-  if (address < kRegisters) return Rule::kFree;  // they guard the process data RAM alone
+std::optional<int> EmulatedEsc::FindManager(size_t address, size_t size, bool write) const {
+  if (address < kRegisters) return kNoManager;  // they guard the process data RAM alone
   for (int i = 0; i < kNumSyncManagers; ++i) {
     const SyncManagerSettings sync = sync_manager(i);
     if (!sync.active || sync.length == 0 || !Overlap(address, size, sync.start, sync.length)) {
@@ -131,34 +130,27 @@ EmulatedEsc::Rule EmulatedEsc::SyncManagerRule(size_t address, size_t size, bool
     const bool masters = (sync.control & kSmMasterWrites) != 0;
     if ((memory_[base + 7] & kSmPdiDisable) != 0 || masters != write || address != sync.start ||
         size > sync.length) {
-      return Rule::kRefused;
+      return std::nullopt;
     }
-    if ((sync.control & kSmModeMask) == kSmModeMailbox) {
-      const bool full = (memory_[base + 5] & kSmStatusFull) != 0;
-      if (full == write) return Rule::kRefused;
-    }
-    *manager = i;
-    return Rule::kBuffer;
+    const bool full = (memory_[base + 5] & kSmStatusFull) != 0;
+    if (sync.mailbox() && full == write) return std::nullopt;
+    return i;
   }
-  return Rule::kFree;
+  return kNoManager;
 }
 
 bool EmulatedEsc::Read(uint16_t address, std::span<uint8_t> data, int64_t now) {
   AdvanceTo(now);
   if (data.empty() || address + data.size() > kMemory) return false;
-  int manager = -1;
-  const Rule rule = SyncManagerRule(address, data.size(), false, &manager);
-  if (rule == Rule::kRefused) return false;
+  const std::optional<int> manager = FindManager(address, data.size(), false);
+  if (!manager) return false;
   if (address < kRegisters) {
     Put<int64_t>(memory_, reg::kDcSystemTime, SystemTime());
   }
   std::copy_n(memory_.begin() + address, data.size(), data.begin());
-  if (rule == Rule::kBuffer) {
-    const SyncManagerSettings sync = sync_manager(manager);
-    const bool mailbox = (sync.control & kSmModeMask) == kSmModeMailbox;
-    if (mailbox && data.size() == sync.length) {
-      SyncByte(manager, 5) &= static_cast<uint8_t>(~kSmStatusFull);
-    }
+  if (*manager != kNoManager) {
+    const SyncManagerSettings sync = sync_manager(*manager);
+    if (sync.mailbox() && data.size() == sync.length) EmptyMailbox(*manager);
   }
   return true;
 }
@@ -169,17 +161,16 @@ bool EmulatedEsc::Write(uint16_t address, std::span<const uint8_t> data, int64_t
   if (address < kRegisters) {
     return !Refuses(address, data.size()) && WriteRegisters(address, data);
   }
-  int manager = -1;
-  const Rule rule = SyncManagerRule(address, data.size(), true, &manager);
-  if (rule == Rule::kRefused) return false;
+  const std::optional<int> manager = FindManager(address, data.size(), true);
+  if (!manager) return false;
   std::copy(data.begin(), data.end(), memory_.begin() + address);
-  if (rule != Rule::kBuffer) return true;
-  const SyncManagerSettings sync = sync_manager(manager);
+  if (*manager == kNoManager) return true;
+  const SyncManagerSettings sync = sync_manager(*manager);
   if (data.size() != sync.length) return true;  // the buffer is complete with its last byte
-  if ((sync.control & kSmModeMask) == kSmModeMailbox) {
-    SyncByte(manager, 5) |= kSmStatusFull;
-    mailbox_written_ = mailbox_written_ || manager == kMailboxOut;
-  } else if (manager == output_manager_) {
+  if (sync.mailbox()) {
+    SyncByte(*manager, 5) |= kSmStatusFull;
+    mailbox_written_ = mailbox_written_ || *manager == kMailboxOut;
+  } else if (*manager == output_manager()) {
     outputs_written_ = true;
     if ((sync.control & kSmWatchdog) != 0) {
       watchdog_triggered_ = now;
@@ -219,13 +210,13 @@ bool EmulatedEsc::WriteRegisters(size_t address, std::span<const uint8_t> data) 
     if (at >= reg::kDcReceiveTime && at < reg::kDcOffset) continue;
     memory_[at] = IsCounter(at) ? uint8_t{0} : data[i];
   }
-  if (any) AfterWrite(address, data.size(), data);
+  if (any) AfterWrite(address, data);
   return any;
 }
 
-void EmulatedEsc::AfterWrite(size_t address, size_t size, std::span<const uint8_t> data) {
+void EmulatedEsc::AfterWrite(size_t address, std::span<const uint8_t> data) {
   const auto touches = [&](size_t first, size_t count) {
-    return Overlap(address, size, first, count);
+    return Overlap(address, data.size(), first, count);
   };
   if (touches(reg::kAlControl, 1)) al_control_ = Get<uint16_t>(memory_, reg::kAlControl);
   if (touches(reg::kEepromControl, 2)) {
@@ -243,14 +234,14 @@ void EmulatedEsc::AfterWrite(size_t address, size_t size, std::span<const uint8_
     const size_t base = reg::kSyncManager + static_cast<size_t>(i) * kSyncManagerSize;
     if (!touches(base + 6, 1)) continue;
     if (!sync_manager(i).active) {
-      memory_[base + 5] = 0;
-      memory_[base + 7] &= static_cast<uint8_t>(~kSmPdiDisable);
+      SyncByte(i, 5) = 0;
+      SyncByte(i, 7) &= static_cast<uint8_t>(~kSmPdiDisable);
     }
-    if (i == kMailboxIn && ((memory_[base + 6] ^ memory_[base + 7]) & kSmRepeatRequest) != 0) {
+    if (i == kMailboxIn && ((SyncByte(i, 6) ^ SyncByte(i, 7)) & kSmRepeatRequest) != 0) {
       repeat_requested_ = true;
     }
   }
-  if (address == reg::kDcSystemTime && size >= 4) CompareSystemTime(data);
+  if (address == reg::kDcSystemTime && data.size() >= 4) CompareSystemTime(data);
   if (touches(reg::kDcSpeedStart, 2)) rate_ = adjustment_ = 0;
   if (touches(reg::kDcActivation, 1)) StartSync0();
 }
@@ -387,14 +378,13 @@ std::span<uint8_t> EmulatedEsc::Buffer(int index) {
 void EmulatedEsc::ClearMailboxes() {
   mailbox_written_ = repeat_requested_ = false;
   for (const int manager : {kMailboxOut, kMailboxIn}) {
-    if ((sync_manager(manager).control & kSmModeMask) != kSmModeMailbox) continue;
-    SyncByte(manager, 5) &= static_cast<uint8_t>(~kSmStatusFull);
+    if (sync_manager(manager).mailbox()) EmptyMailbox(manager);
   }
 }
 
 std::span<const uint8_t> EmulatedEsc::TakeMailbox() {
   if (!std::exchange(mailbox_written_, false)) return {};
-  SyncByte(kMailboxOut, 5) &= static_cast<uint8_t>(~kSmStatusFull);
+  EmptyMailbox(kMailboxOut);
   return Buffer(kMailboxOut);
 }
 

@@ -54,10 +54,14 @@ class EmulatedEsc {
     uint16_t start = 0, length = 0;
     uint8_t control = 0;
     bool active = false;
+    bool mailbox() const { return (control & kSmModeMask) == kSmModeMailbox; }
   };
   SyncManagerSettings sync_manager(int index) const;
-  /// The application's own disabling of a sync manager: its memory refuses the master.
-  void SetSyncManagerDisabled(int index, bool disabled);
+  /// Which sync managers have the process data: those after the mailboxes, unless there are none.
+  int output_manager() const { return config_.mailbox() ? kProcessOut : 0; }
+  int input_manager() const { return config_.mailbox() ? kProcessIn : 1; }
+  /// The application's own disabling of the outputs: their memory refuses the master.
+  void SetOutputsDisabled(bool disabled);
 
   /// Empties both mailboxes, as a slave does that leaves for INIT.
   void ClearMailboxes();
@@ -71,13 +75,8 @@ class EmulatedEsc {
   void AcknowledgeRepeat();
 
   /// Buffers of the process data; empty when the sync manager is not active.
-  std::span<const uint8_t> process_outputs() { return Buffer(output_manager_); }
-  /// Which sync managers have the process data: those after the mailboxes, unless there are none.
-  void SetProcessManagers(int outputs, int inputs) {
-    output_manager_ = outputs;
-    input_manager_ = inputs;
-  }
-  std::span<uint8_t> process_inputs() { return Buffer(input_manager_); }
+  std::span<const uint8_t> process_outputs() { return Buffer(output_manager()); }
+  std::span<uint8_t> process_inputs() { return Buffer(input_manager()); }
   /// Whether the master has written all process outputs since the last call.
   bool TakeOutputsWritten() { return std::exchange(outputs_written_, false); }
   bool watchdog_expired() const { return watchdog_expired_; }
@@ -95,17 +94,18 @@ class EmulatedEsc {
  private:
   static constexpr size_t kMemory = 0x3000;  // registers, then 8 KiB of process data RAM
 
-  enum class Rule { kFree, kRefused, kBuffer };
-  /// How the sync managers treat an access by the master; `manager`: whose buffer it is.
-  Rule SyncManagerRule(size_t address, size_t size, bool write, int* manager) const;
+  static constexpr int kNoManager = -1;
+  /// The sync manager whose buffer the master accesses, or kNoManager; nullopt: it is refused.
+  std::optional<int> FindManager(size_t address, size_t size, bool write) const;
   std::span<uint8_t> Buffer(int index);
   void CountUp(size_t address) {
     if (memory_[address] < 0xFF) ++memory_[address];
   }
   uint8_t& SyncByte(int index, size_t offset);
+  void EmptyMailbox(int index) { SyncByte(index, 5) &= static_cast<uint8_t>(~kSmStatusFull); }
   bool Refuses(size_t address, size_t size) const;
   bool WriteRegisters(size_t address, std::span<const uint8_t> data);
-  void AfterWrite(size_t address, size_t size, std::span<const uint8_t> data);
+  void AfterWrite(size_t address, std::span<const uint8_t> data);
   void UpdateEeprom();
   void UpdateWatchdog();
   void CompareSystemTime(std::span<const uint8_t> data);
@@ -113,7 +113,6 @@ class EmulatedEsc {
 
   EmulatedDriveConfig config_;
   std::vector<uint16_t> eeprom_;
-  int output_manager_ = kProcessOut, input_manager_ = kProcessIn;
   std::array<uint8_t, kMemory> memory_{};
   int64_t now_ = 0;  // ns, true time
   std::optional<uint16_t> al_control_;

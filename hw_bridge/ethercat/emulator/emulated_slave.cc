@@ -106,11 +106,6 @@ EmulatedSlave::EmulatedSlave(const EmulatedDriveConfig& config, MotorLoad* load)
       esc_(config, MakeEeprom(config)),
       drive_(config, config.other() ? &unused_ : &objects_, load),
       coe_(&objects_, kMailboxSize, config.complete_access()) {
-  if (!config_.mailbox()) {
-    output_manager_ = 0;
-    input_manager_ = 1;
-    esc_.SetProcessManagers(output_manager_, input_manager_);
-  }
   AddCommonObjects();
   const bool own = config_.other() || config_.fixed_rx_size() > 0 || config_.fixed_tx_size() > 0;
   if (own) {
@@ -130,32 +125,27 @@ void EmulatedSlave::AddCommonObjects() {
   constexpr uint32_t kServoDrive = 0x00020192;  // device type: CiA 402, servo
   constexpr uint8_t kReadOnly = ObjectDictionary::kReadOnly;
   constexpr uint8_t kRw = ObjectDictionary::kWritable;
-  const auto name = [this](uint16_t index, const char* text) { objects_.SetName(index, text); };
-  objects_.Add({0x1000, 0}, 4, kReadOnly, config_.other() ? 0 : kServoDrive);
-  name(0x1000, "Device type");
-  if (objects_.Find({0x1001, 0}) == nullptr) objects_.Add({0x1001, 0}, 1, kReadOnly);
-  name(0x1001, "Error register");
-  objects_.AddText({0x1008, 0}, config_.device_name());
-  name(0x1008, "Manufacturer device name");
-  objects_.AddText({0x1009, 0}, "1.0");
-  name(0x1009, "Manufacturer hardware version");
-  objects_.AddText({0x100A, 0}, "1.0");
-  name(0x100A, "Manufacturer software version");
-  objects_.Add({0x1018, 0}, 1, kReadOnly, 4);
+  objects_.Add({0x1000, 0}, 4, kReadOnly, config_.other() ? 0 : kServoDrive)->name = "Device type";
+  if (objects_.Find({0x1001, 0}) == nullptr) {
+    objects_.Add({0x1001, 0}, 1, kReadOnly)->name = "Error register";
+  }
+  objects_.AddText({0x1008, 0}, config_.device_name())->name = "Manufacturer device name";
+  objects_.AddText({0x1009, 0}, "1.0")->name = "Manufacturer hardware version";
+  objects_.AddText({0x100A, 0}, "1.0")->name = "Manufacturer software version";
+  objects_.Add({0x1018, 0}, 1, kReadOnly, 4)->name = "Identity object";
   objects_.Add({0x1018, 1}, 4, kReadOnly, config_.vendor_id());
   objects_.Add({0x1018, 2}, 4, kReadOnly, config_.product_code());
   objects_.Add({0x1018, 3}, 4, kReadOnly, config_.revision());
   objects_.Add({0x1018, 4}, 4, kReadOnly, config_.serial());
-  name(0x1018, "Identity object");
-  objects_.Add({0x1C00, 0}, 1, kReadOnly, 4);
+  objects_.Add({0x1C00, 0}, 1, kReadOnly, 4)->name = "Sync manager type";
   for (uint8_t i = 1; i <= 4; ++i) objects_.Add({0x1C00, i}, 1, kReadOnly, i);
-  name(0x1C00, "Sync manager type");
   // Sync manager parameters (ETG.1020): synchronised by SYNC0, cycle as SYNC0 has it.
   for (const uint16_t index : {uint16_t{0x1C32}, uint16_t{0x1C33}}) {
     constexpr uint32_t kDcSync0 = 2, kSupported = 0x0006;          // SM event and SYNC0
     constexpr uint32_t kCycle = 2'000'000, kLeastCycle = 125'000;  // ns
-    objects_.Add({index, 0}, 1, kReadOnly, 0x20);
     const bool inputs = index == 0x1C33;
+    objects_.Add({index, 0}, 1, kReadOnly, 0x20)->name =
+        inputs ? "SM input parameter" : "SM output parameter";
     objects_.Add({index, 1}, 2, kRw, kDcSync0, [inputs](uint32_t type) {
       constexpr uint32_t kSmEvent = 1, kSm2Event = 0x22;
       return InRange(type == kSmEvent || type == kDcSync0 || (inputs && type == kSm2Event));
@@ -168,36 +158,34 @@ void EmulatedSlave::AddCommonObjects() {
     objects_.Add({index, 9}, 4, kReadOnly, 0);
     objects_.Add({index, 0x0B}, 2, kReadOnly, 0);
     objects_.Add({index, 0x20}, 1, kReadOnly, 0);
-    name(index, index == 0x1C32 ? "SM output parameter" : "SM input parameter");
   }
   // Room for a note of the user's: an object that takes segments.
   constexpr size_t kMostNote = 512;
-  objects_.AddText({0x2F00, 0}, "", kMostNote);
-  name(0x2F00, "User note");
+  objects_.AddText({0x2F00, 0}, "", kMostNote)->name = "User note";
 }
 
 void EmulatedSlave::AddAssignment(uint16_t assign, const std::vector<uint16_t>& assigned,
                                   const std::vector<uint16_t>& allowed) {
   constexpr uint8_t kRw = ObjectDictionary::kWritable;
-  objects_.SetName(assign, assign == object::kRxAssign ? "RxPDO assign" : "TxPDO assign");
-  objects_.Add({assign, 0}, 1, kRw, static_cast<uint32_t>(assigned.size()), [this](uint32_t count) {
+  const auto number = static_cast<uint32_t>(assigned.size());
+  Object* const assignment = objects_.Add({assign, 0}, 1, kRw, number, [this](uint32_t count) {
     if (state_ != AlState::kPreOp) return SdoAbort::kDeviceState;
-    return count <= kMostAssigned ? SdoAbort::kNone : SdoAbort::kValueRange;
+    return InRange(count <= kMostAssigned);
   });
+  assignment->name = assign == object::kRxAssign ? "RxPDO assign" : "TxPDO assign";
   for (uint8_t i = 1; i <= kMostAssigned; ++i) {
     const uint32_t pdo = i <= assigned.size() ? assigned[i - 1U] : 0U;
     objects_.Add({assign, i}, 2, kRw, pdo, [=, this](uint32_t value) {
       if (state_ != AlState::kPreOp) return SdoAbort::kDeviceState;
       if (Value(assign, 0) != 0) return SdoAbort::kSubindexNotWritable;
-      const bool known = std::find(allowed.begin(), allowed.end(), value) != allowed.end();
-      return known ? SdoAbort::kNone : SdoAbort::kValueRange;
+      return InRange(std::ranges::find(allowed, value) != allowed.end());
     });
   }
 }
 
 void EmulatedSlave::AddFixedPdo(uint16_t pdo, const std::vector<uint32_t>& mappings) {
-  objects_.SetName(pdo, "PDO mapping");
-  objects_.Add({pdo, 0}, 1, ObjectDictionary::kReadOnly, static_cast<uint32_t>(mappings.size()));
+  const auto number = static_cast<uint32_t>(mappings.size());
+  objects_.Add({pdo, 0}, 1, ObjectDictionary::kReadOnly, number)->name = "PDO mapping";
   uint8_t subindex = 0;
   for (const uint32_t mapping : mappings) {
     objects_.Add({pdo, ++subindex}, 4, ObjectDictionary::kReadOnly, mapping);
@@ -206,24 +194,21 @@ void EmulatedSlave::AddFixedPdo(uint16_t pdo, const std::vector<uint32_t>& mappi
 
 void EmulatedSlave::AddFreePdo(uint16_t assign, uint16_t pdo, uint8_t mappable) {
   constexpr uint8_t kRw = ObjectDictionary::kWritable;
-  objects_.SetName(pdo, "PDO mapping");
-  objects_.Add({pdo, 0}, 1, kRw, 0, [=, this](uint32_t count) {
+  Object* const mapped = objects_.Add({pdo, 0}, 1, kRw, 0, [=, this](uint32_t count) {
     if (state_ != AlState::kPreOp) return SdoAbort::kDeviceState;
     for (uint32_t i = 1; i <= Value(assign, 0); ++i) {
-      if (Value(assign, i) == pdo) {
-        return SdoAbort::kUnsupportedAccess;
-      }
+      if (Value(assign, i) == pdo) return SdoAbort::kUnsupportedAccess;
     }
     if (count > kMostMapped) return SdoAbort::kPdoTooLong;
     for (uint32_t i = 1; i <= count; ++i) {
-      const uint32_t mapping = Value(pdo, i);
-      const SdoAbort abort = CheckMapping(mapping, mappable);
+      const SdoAbort abort = CheckMapping(Value(pdo, i), mappable);
       if (abort != SdoAbort::kNone) return abort;
     }
     // Entries are given anew: none of an earlier mapping is left to be counted.
     for (uint8_t i = 1; count == 0 && i <= kMostMapped; ++i) objects_.Find({pdo, i})->value = 0;
     return SdoAbort::kNone;
   });
+  mapped->name = "PDO mapping";
   for (uint8_t i = 1; i <= kMostMapped; ++i) {
     objects_.Add({pdo, i}, 4, kRw, 0, [=, this](uint32_t mapping) {
       if (state_ != AlState::kPreOp) return SdoAbort::kDeviceState;
@@ -303,7 +288,7 @@ void EmulatedSlave::AdvanceTo(int64_t now) {
     Enter(AlState::kSafeOp);
     Fail(AlStatusCode::kSyncManagerWatchdog);
     // The application stops taking outputs: the working counter shows it.
-    esc_.SetSyncManagerDisabled(output_manager_, true);
+    esc_.SetOutputsDisabled(true);
   }
   if (outputs_pending_ && (sync0 || !esc_.sync0_enabled())) {
     outputs_pending_ = false;
@@ -341,7 +326,7 @@ void EmulatedSlave::HandleAlControl(uint16_t control) {
     requested_ = wanted;
     requested_at_ = now_;
     if (wanted == AlState::kOp) {
-      esc_.SetSyncManagerDisabled(output_manager_, false);
+      esc_.SetOutputsDisabled(false);
       esc_.RestartWatchdog();
       outputs_seen_ = sync0_seen_ = false;
     }
@@ -363,10 +348,11 @@ AlStatusCode EmulatedSlave::CheckTransition(AlState state) {
     outputs_ = FindMapped(object::kRxAssign);
     inputs_ = FindMapped(object::kTxAssign);
     if (outputs_.bits > 0 &&
-        !matches(output_manager_, kOutputsStart, outputs_.size(), kSmProcessOut)) {
+        !matches(esc_.output_manager(), kOutputsStart, outputs_.size(), kSmProcessOut)) {
       return AlStatusCode::kInvalidOutputConfiguration;
     }
-    if (inputs_.bits > 0 && !matches(input_manager_, kInputsStart, inputs_.size(), kSmProcessIn)) {
+    if (inputs_.bits > 0 &&
+        !matches(esc_.input_manager(), kInputsStart, inputs_.size(), kSmProcessIn)) {
       return AlStatusCode::kInvalidInputConfiguration;
     }
     if (esc_.sync0_enabled() && esc_.sync0_cycle() == 0) return AlStatusCode::kInvalidSync0Cycle;

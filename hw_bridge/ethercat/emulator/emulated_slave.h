@@ -81,7 +81,6 @@ class EmulatedSlave {
   EmulatedEsc esc_;
   EmulatedDrive drive_;
   CoeServer coe_;
-  int output_manager_ = kProcessOut, input_manager_ = kProcessIn;
   int64_t now_ = 0;
 
   AlState state_ = AlState::kInit;

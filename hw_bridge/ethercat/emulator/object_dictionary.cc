@@ -33,13 +33,11 @@ ObjectDictionary::Object* ObjectDictionary::AddText(ObjectAddress address, std::
   return object;
 }
 
-void ObjectDictionary::Remove(uint16_t index) {
-  std::erase_if(objects_, [index](const auto& entry) { return entry.first.index == index; });
-}
-
 std::string ObjectDictionary::NameOf(uint16_t index) const {
-  const auto found = names_.find(index);
-  return found != names_.end() ? found->second : fmt::format("object {:04X}", index);
+  const auto first = objects_.lower_bound({index, 0});
+  const bool named = first != objects_.end() && first->first.index == index;
+  return named && !first->second.name.empty() ? first->second.name
+                                              : fmt::format("object {:04X}", index);
 }
 
 const ObjectDictionary::Object* ObjectDictionary::Find(ObjectAddress address) const {

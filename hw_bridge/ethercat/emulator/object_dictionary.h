@@ -23,6 +23,7 @@ class ObjectDictionary {
     uint8_t size = 4;  ///< bytes, 1 to 4; 0: a text
     uint8_t access = kReadOnly;
     uint32_t value = 0;
+    std::string name = {};   ///< what SDO information calls the index; of its first object
     std::string text = {};   ///< of size 0
     size_t most_text = 0;    ///< bytes that a writable text takes
     bool is_signed = false;  ///< its data type
@@ -38,9 +39,7 @@ class ObjectDictionary {
   Object* Add(ObjectAddress address, uint8_t size, uint8_t access, uint32_t value = 0,
               std::function<SdoAbort(uint32_t)> on_write = nullptr);
   Object* AddText(ObjectAddress address, std::string text, size_t most = 0);
-  void Remove(uint16_t index);
-  /// What SDO information calls the objects of an index.
-  void SetName(uint16_t index, std::string name) { names_[index] = std::move(name); }
+  /// Returns the name of the index, or one made of its number.
   std::string NameOf(uint16_t index) const;
   /// nullptr when there is none.
   const Object* Find(ObjectAddress address) const;
@@ -60,7 +59,6 @@ class ObjectDictionary {
   SdoAbort Missing(ObjectAddress address) const;
 
   std::map<ObjectAddress, Object> objects_;
-  std::map<uint16_t, std::string> names_;
 };
 
 }  // namespace poise::ethercat
