@@ -43,12 +43,7 @@ FeedbackMonitor::FeedbackMonitor(const SupervisorConfig& config)
       raw_velocity_(config.motors.size(), 0.0),
       commanded_(static_cast<size_t>(std::max(1, config.current_cycles)),
                  std::vector<double>(config.motors.size(), 0.0)),
-      enabled_(config.motors.size(), 0),
-      still_cycles_(config.motors.size(), 0),
-      changed_cycles_(config.motors.size(), 0),
-      error_cycles_(config.motors.size(), 0),
-      least_torque_(config.motors.size(), 0.0),
-      greatest_torque_(config.motors.size(), 0.0) {}
+      watches_(config.motors.size()) {}
 
 FeedbackMonitor::Problem FeedbackMonitor::Find(const drive_feedback_t& feedback) const {
   const size_t n = config_.motors.size();
@@ -75,7 +70,7 @@ FeedbackMonitor::Problem FeedbackMonitor::Find(const drive_feedback_t& feedback)
 
 // Across a cycle without feedback nothing is known of the way.
 int FeedbackMonitor::FindJump(const drive_feedback_t& feedback) const {
-  if (!consecutive_ || config_.velocity_limit.empty()) return -1;
+  if (!consecutive_) return -1;
   for (size_t j = 0; j < counts_.size(); ++j) {
     // Doubles are subtracted: the difference of two 64-bit counts may not fit 64 bits.
     const double change =
@@ -87,20 +82,22 @@ int FeedbackMonitor::FindJump(const drive_feedback_t& feedback) const {
 }
 
 FeedbackMonitor::Problem FeedbackMonitor::FindFault(const drive_feedback_t& feedback) {
-  for (size_t j = 0; j < config_.motors.size(); ++j) {
-    const double torque = JointTorque(config_.motors[j], commanded_.front()[j]);
-    if (enabled_[j] == 0 || !consecutive_ || feedback.position_counts[j] != counts_[j]) {
-      still_cycles_[j] = changed_cycles_[j] = 0;
+  for (size_t j = 0; j < watches_.size(); ++j) {
+    Watch& watch = watches_[j];
+    const robot::MotorModel& motor = config_.motors[j];
+    const double torque = JointTorque(motor, commanded_.front()[j]);
+    if (!watch.enabled || !consecutive_ || feedback.position_counts[j] != counts_[j]) {
+      watch.still_cycles = watch.changed_cycles = 0;
     } else {
-      if (still_cycles_[j] == 0) least_torque_[j] = greatest_torque_[j] = torque;
-      still_cycles_[j] = std::min(still_cycles_[j] + 1, frozen_cycles_);
-      least_torque_[j] = std::min(least_torque_[j], torque);
-      greatest_torque_[j] = std::max(greatest_torque_[j], torque);
+      if (watch.still_cycles == 0) watch.least_torque = watch.greatest_torque = torque;
+      watch.still_cycles = std::min(watch.still_cycles + 1, frozen_cycles_);
+      watch.least_torque = std::min(watch.least_torque, torque);
+      watch.greatest_torque = std::max(watch.greatest_torque, torque);
       const bool changed =
-          greatest_torque_[j] - least_torque_[j] > config_.thresholds.frozen_torque;
-      changed_cycles_[j] = changed ? std::min(changed_cycles_[j] + 1, response_cycles_) : 0;
+          watch.greatest_torque - watch.least_torque > config_.thresholds.frozen_torque;
+      watch.changed_cycles = changed ? std::min(watch.changed_cycles + 1, response_cycles_) : 0;
     }
-    if (still_cycles_[j] >= frozen_cycles_ && changed_cycles_[j] >= response_cycles_) {
+    if (watch.still_cycles >= frozen_cycles_ && watch.changed_cycles >= response_cycles_) {
       return {bridge_status_t::REASON_ENCODER_FROZEN, static_cast<int>(j)};
     }
     double least = commanded_.front()[j], greatest = least;
@@ -109,12 +106,11 @@ FeedbackMonitor::Problem FeedbackMonitor::FindFault(const drive_feedback_t& feed
       greatest = std::max(greatest, commanded[j]);
     }
     const double beyond = feedback.current[j] - std::clamp(feedback.current[j], least, greatest);
-    const bool differs =
-        config_.motors[j].current_sensor && enabled_[j] != 0 &&
-        std::abs(JointTorque(config_.motors[j], beyond)) > config_.thresholds.torque_error;
-    error_cycles_[j] =
-        differs ? std::min(error_cycles_[j] + 1, config_.settings.torque_error_cycles()) : 0;
-    if (differs && error_cycles_[j] >= config_.settings.torque_error_cycles()) {
+    const bool differs = motor.current_sensor && watch.enabled &&
+                         std::abs(JointTorque(motor, beyond)) > config_.thresholds.torque_error;
+    const int most = config_.settings.torque_error_cycles();
+    watch.error_cycles = differs ? std::min(watch.error_cycles + 1, most) : 0;
+    if (differs && watch.error_cycles >= most) {
       return {bridge_status_t::REASON_TORQUE_IMPLAUSIBLE, static_cast<int>(j)};
     }
   }
@@ -140,18 +136,18 @@ FeedbackMonitor::Problem FeedbackMonitor::Update(const drive_feedback_t& feedbac
 
 void FeedbackMonitor::EndCycle(std::span<const double> current, std::span<const int8_t> enabled) {
   std::ranges::rotate(commanded_, commanded_.end() - 1);  // moves the vectors, not their numbers
-  for (size_t j = 0; j < enabled_.size(); ++j) {
+  for (size_t j = 0; j < watches_.size(); ++j) {
     commanded_.front()[j] = current[j];
-    enabled_[j] = enabled[j] != 0 ? 1 : 0;
+    watches_[j].enabled = enabled[j] != 0;
   }
   consecutive_ = updated_;
   updated_ = false;
 }
 
 void FeedbackMonitor::Reset() {
-  std::fill(still_cycles_.begin(), still_cycles_.end(), 0);
-  std::fill(changed_cycles_.begin(), changed_cycles_.end(), 0);
-  std::fill(error_cycles_.begin(), error_cycles_.end(), 0);
+  for (Watch& watch : watches_) {
+    watch.still_cycles = watch.changed_cycles = watch.error_cycles = 0;
+  }
 }
 
 }  // namespace poise

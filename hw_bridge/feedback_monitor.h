@@ -49,9 +49,12 @@ class FeedbackMonitor {
   std::vector<int64_t> counts_;
   std::vector<double> velocity_, raw_velocity_;
   std::vector<std::vector<double>> commanded_;  // A, in the cycles before, the last one first
-  std::vector<char> enabled_;
-  std::vector<int> still_cycles_, changed_cycles_, error_cycles_;
-  std::vector<double> least_torque_, greatest_torque_;  // N·m, commanded since the last movement
+  struct Watch {
+    bool enabled = false;
+    int still_cycles = 0, changed_cycles = 0, error_cycles = 0;
+    double least_torque = 0, greatest_torque = 0;  // N·m, commanded since the last movement
+  };
+  std::vector<Watch> watches_;  // by joint
   bool known_ = false, updated_ = false;
   bool consecutive_ = false;  // counts_ are those of the cycle before
 };

@@ -12,37 +12,11 @@ namespace {
 
 using Status = bridge_status_t;
 
-int8_t ReasonOf(Refusal refusal) {
-  switch (refusal) {
-    case Refusal::kRun:
-      return Status::REASON_COMMAND_RUN;
-    case Refusal::kSize:
-      return Status::REASON_COMMAND_SIZE;
-    case Refusal::kSequence:
-      return Status::REASON_COMMAND_SEQUENCE;
-    case Refusal::kStale:
-      return Status::REASON_COMMAND_STALE;
-    case Refusal::kNotFinite:
-      return Status::REASON_COMMAND_NOT_FINITE;
-    case Refusal::kNone:
-      break;
-  }
-  return Status::REASON_NONE;
-}
-
-/// Returns the state of a drive whose bus gives no reports.
-int8_t DriveStateOf(int32_t drive_status) {
-  switch (drive_status) {
-    case drive_feedback_t::DRIVE_DISABLED:
-      return Status::DRIVE_SWITCH_ON_DISABLED;
-    case drive_feedback_t::DRIVE_ENABLED:
-      return Status::DRIVE_ENABLED;
-    case drive_feedback_t::DRIVE_FAULT:
-      return Status::DRIVE_FAULT;
-    default:
-      return Status::DRIVE_UNKNOWN;
-  }
-}
+/// By Refusal.
+constexpr int8_t kReasons[kNumRefusals] = {
+    Status::REASON_NONE,          Status::REASON_COMMAND_RUN,
+    Status::REASON_COMMAND_SIZE,  Status::REASON_COMMAND_SEQUENCE,
+    Status::REASON_COMMAND_STALE, Status::REASON_COMMAND_NOT_FINITE};
 
 }  // namespace
 
@@ -75,6 +49,12 @@ Supervisor::Supervisor(const SupervisorConfig& config)
   }
 }
 
+void Supervisor::Enter(int8_t state, int8_t reason, int joint) {
+  state_ = state;
+  reason_ = reason;
+  reason_joint_ = joint;
+}
+
 void Supervisor::Latch(int8_t state, int8_t reason, int joint) {
   if (latched()) {
     if (state == Status::STATE_ESTOP) state_ = state;
@@ -83,9 +63,7 @@ void Supervisor::Latch(int8_t state, int8_t reason, int joint) {
   // Motors that were never given torque are not given any in order to stop.
   const bool at_rest = state_ <= Status::STATE_ENABLING;
   ramp_left_ = at_rest ? 0 : stop_ramp_cycles_;
-  state_ = state;
-  reason_ = reason;
-  reason_joint_ = joint;
+  Enter(state, reason, joint);
 }
 
 bool Supervisor::Read(const drive_feedback_t& feedback, std::span<const DriveReport> reports) {
@@ -131,14 +109,9 @@ void Supervisor::CheckMotion(const drive_feedback_t& feedback) {
   if (!active()) return;
   for (size_t j = 0; j < faulted_.size(); ++j) {
     const auto joint = static_cast<int>(j);
-    if (!config_.lower.empty() &&
-        (Position(j) < config_.lower[j] - config_.settings.position_margin() ||
-         Position(j) > config_.upper[j] + config_.settings.position_margin())) {
-      Latch(Status::STATE_STOPPING, Status::REASON_JOINT_POSITION, joint);
-    }
-    if (!config_.velocity_limit.empty() &&
-        std::abs(joint_velocity()[j]) >
-            config_.settings.velocity_trip() * config_.velocity_limit[j]) {
+    if (!Inside(j)) Latch(Status::STATE_STOPPING, Status::REASON_JOINT_POSITION, joint);
+    if (std::abs(joint_velocity()[j]) >
+        config_.settings.velocity_trip() * config_.velocity_limit[j]) {
       Latch(Status::STATE_STOPPING, Status::REASON_JOINT_VELOCITY, joint);
     }
   }
@@ -174,21 +147,25 @@ double Supervisor::Position(size_t joint) const {
   return JointPositionOf(config_.motors[joint], monitor_.counts()[joint]);
 }
 
+bool Supervisor::Inside(size_t joint) const {
+  const double margin = config_.settings.position_margin();
+  return Position(joint) >= config_.lower[joint] - margin &&
+         Position(joint) <= config_.upper[joint] + margin;
+}
+
 /// Motors at rest where they can be: else the reason says which is not.
 bool Supervisor::MayStart() {
-  reason_joint_ = -1;
   if (!monitor_.known()) {
-    reason_ = Status::REASON_START_POSITION;
+    Enter(Status::STATE_INIT, Status::REASON_START_POSITION);
     return false;
   }
   for (size_t j = 0; j < torque_.size(); ++j) {
-    const bool inside = config_.lower.empty() ||
-                        (Position(j) >= config_.lower[j] - config_.settings.position_margin() &&
-                         Position(j) <= config_.upper[j] + config_.settings.position_margin());
+    const bool inside = Inside(j);
     const bool at_rest = std::abs(joint_velocity()[j]) <= config_.settings.start_velocity();
     if (inside && at_rest) continue;
-    reason_ = inside ? Status::REASON_START_VELOCITY : Status::REASON_START_POSITION;
-    reason_joint_ = static_cast<int>(j);
+    Enter(Status::STATE_INIT,
+          inside ? Status::REASON_START_VELOCITY : Status::REASON_START_POSITION,
+          static_cast<int>(j));
     return false;
   }
   return true;
@@ -205,9 +182,8 @@ void Supervisor::Reset(const joint_command_t* command) {
       command != nullptr &&
       !(none(command->torque) && none(command->stiffness) && none(command->damping));
   if (asks_torque) return;
-  state_ = Status::STATE_INIT;
-  reason_ = last_refusal_ = Status::REASON_NO_COMMAND;
-  reason_joint_ = -1;
+  last_refusal_ = Status::REASON_NO_COMMAND;
+  Enter(Status::STATE_INIT, last_refusal_);
   std::fill(faulted_.begin(), faulted_.end(), 0);
   monitor_.Reset();
   bus_ = {};
@@ -225,7 +201,7 @@ void Supervisor::UpdateState(int64_t cycle, const joint_command_t* command) {
   if (command != nullptr) {
     const Refusal refusal = gate_.Check(*command, cycle);
     if (refusal != Refusal::kNone) {
-      last_refusal_ = ReasonOf(refusal);
+      last_refusal_ = kReasons[static_cast<size_t>(refusal)];
     } else if (!latched()) {
       std::copy(command->torque.begin(), command->torque.end(), torque_.begin());
       for (size_t j = 0; j < impedance_.size(); ++j) {
@@ -241,13 +217,11 @@ void Supervisor::UpdateState(int64_t cycle, const joint_command_t* command) {
   if (latched()) return;
   if (state_ == Status::STATE_INIT) {
     if (!accepted && !AwaitsFirst()) {
-      reason_ = last_refusal_;
-      reason_joint_ = -1;
+      Enter(Status::STATE_INIT, last_refusal_);
       return;
     }
     if (fault_grace_ > 0 || !MayStart()) return;
-    state_ = Status::STATE_ENABLING;
-    reason_ = Status::REASON_DRIVE_NOT_ENABLED;
+    Enter(Status::STATE_ENABLING, Status::REASON_DRIVE_NOT_ENABLED);
     enabling_cycles_ = start_ramp_ = resume_left_ = 0;
     slew_known_ = false;
   }
@@ -260,9 +234,7 @@ void Supervisor::Follow(int64_t age) {
   const bool fresh = !first && age <= config_.settings.damping_after_cycles();
   if (state_ == Status::STATE_ENABLING) {
     if (!fresh && !first) {  // nothing to follow: down again
-      state_ = Status::STATE_INIT;
-      reason_ = last_refusal_;
-      reason_joint_ = -1;
+      Enter(Status::STATE_INIT, last_refusal_);
       return;
     }
     const auto waiting = std::find(enabled_.begin(), enabled_.end(), 0);
@@ -281,15 +253,11 @@ void Supervisor::Follow(int64_t age) {
   }
   if (first) {
     HoldStart();
-    return;
-  }
-  if (!fresh) {
+  } else if (!fresh) {
     UpdateLoss(age);
-    return;
+  } else {
+    Enter(Status::STATE_RUNNING, Status::REASON_NONE);
   }
-  state_ = Status::STATE_RUNNING;
-  reason_ = Status::REASON_NONE;
-  reason_joint_ = -1;
 }
 
 void Supervisor::HoldStart() {
@@ -297,9 +265,7 @@ void Supervisor::HoldStart() {
     std::fill(hold_torque_.begin(), hold_torque_.end(), 0.0);
     hold_counts_ = monitor_.counts();
   }
-  state_ = Status::STATE_HOLDING;
-  reason_ = last_refusal_;
-  reason_joint_ = -1;
+  Enter(Status::STATE_HOLDING, last_refusal_);
 }
 
 void Supervisor::UpdateLoss(int64_t age) {
@@ -309,11 +275,9 @@ void Supervisor::UpdateLoss(int64_t age) {
       hold_torque_ = applied_;
       hold_counts_ = monitor_.counts();
     }
-    state_ = Status::STATE_HOLDING;
-    reason_ = last_refusal_;
+    Enter(Status::STATE_HOLDING, last_refusal_);
   } else if (age <= damping_after + config_.settings.stop_after_cycles()) {
-    state_ = Status::STATE_DAMPING;
-    reason_ = last_refusal_;
+    Enter(Status::STATE_DAMPING, last_refusal_);
   } else {
     Latch(Status::STATE_STOPPING, last_refusal_);
   }
@@ -365,22 +329,13 @@ double Supervisor::WantedTorque(size_t joint) const {
 /// Confined to what the robot bears.
 Impedance Supervisor::FollowedImpedance(size_t joint, int8_t* limits) const {
   Impedance result = impedance_[joint];
-  bool confined = false;
-  if (!config_.thresholds.stiffness_limit.empty()) {
-    confined |= Confine(0, config_.thresholds.stiffness_limit[joint], &result.stiffness);
-  }
-  if (!config_.thresholds.damping_limit.empty()) {
-    confined |= Confine(0, config_.thresholds.damping_limit[joint], &result.damping);
-  }
-  if (!config_.lower.empty()) {
-    confined |=
-        Confine(config_.lower[joint] - config_.settings.position_margin(),
-                config_.upper[joint] + config_.settings.position_margin(), &result.position);
-  }
-  if (!config_.velocity_limit.empty()) {
-    const double most = config_.velocity_limit[joint];
-    confined |= Confine(-most, most, &result.velocity);
-  }
+  const double margin = config_.settings.position_margin();
+  const double most = config_.velocity_limit[joint];
+  bool confined = Confine(0, config_.thresholds.stiffness_limit[joint], &result.stiffness);
+  confined |= Confine(0, config_.thresholds.damping_limit[joint], &result.damping);
+  confined |=
+      Confine(config_.lower[joint] - margin, config_.upper[joint] + margin, &result.position);
+  confined |= Confine(-most, most, &result.velocity);
   confined |=
       result.LimitTorque(Position(joint), joint_velocity()[joint], config_.torque_limit[joint]);
   if (confined) *limits = static_cast<int8_t>(*limits | Status::LIMIT_IMPEDANCE);
@@ -471,12 +426,10 @@ double Supervisor::OrderedTorque(size_t joint, const drive_command_t& command) c
 
 /// Near a soft limit torque that leads further out fades to nothing at the limit.
 double Supervisor::FadePosition(size_t joint, double torque) const {
-  if (config_.lower.empty() || config_.settings.soft_range() <= 0) return torque;
+  const double range = config_.settings.soft_range();
   const double room =
       torque > 0 ? config_.upper[joint] - Position(joint) : Position(joint) - config_.lower[joint];
-  return room >= config_.settings.soft_range()
-             ? torque
-             : torque * std::max(0.0, room / config_.settings.soft_range());
+  return range <= 0 || room >= range ? torque : torque * std::max(0.0, room / range);
 }
 
 double Supervisor::Limit(size_t joint, double wanted, int8_t* limits) const {

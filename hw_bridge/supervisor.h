@@ -88,6 +88,8 @@ class Supervisor {
   bool active() const {
     return state_ >= bridge_status_t::STATE_ENABLING && state_ <= bridge_status_t::STATE_DAMPING;
   }
+  void Enter(int8_t state, int8_t reason, int joint = -1);
+  /// Likewise a state of a stop, which is left only by a reset.
   void Latch(int8_t state, int8_t reason, int joint = -1);
   void CheckDrives(const drive_feedback_t& feedback, std::span<const DriveReport> reports);
   void CheckMotion(const drive_feedback_t& feedback);
@@ -102,6 +104,8 @@ class Supervisor {
   }
   void Follow(int64_t age);
   double Position(size_t joint) const;
+  /// Whether the joint is within its limits and their margin.
+  bool Inside(size_t joint) const;
   double DampingTorque(size_t joint, double share) const;
   double WantedTorque(size_t joint) const;
   /// What the drive is to close by itself in this state; adds LIMIT_IMPEDANCE to `limits`.

@@ -16,12 +16,9 @@ struct SupervisorConfig {
   double period = 0.002;    ///< s, of a cycle
   std::vector<robot::MotorModel> motors;  ///< by joint
   std::vector<double> torque_limit;       ///< N·m, by joint, > 0; the peak current limits too
-  /// rad, by joint; empty: not limited.
-  std::vector<double> lower, upper;
-  std::vector<double> velocity_limit;  ///< rad/s, by joint; empty: no speed or jump is too large
-  /// The robot's thresholds, or those that the settings give. Where stiffness_limit and
-  /// damping_limit are empty, those of a command are not limited.
-  RobotThresholds thresholds;
+  std::vector<double> lower, upper;       ///< rad, by joint
+  std::vector<double> velocity_limit;     ///< rad/s, by joint
+  RobotThresholds thresholds;             ///< the robot's, or those that the settings give
   Eigen::Vector3d upright = Eigen::Vector3d::UnitZ();  ///< up in the IMU's frame when standing
   int num_feet = 2;
   int current_cycles = 1;        ///< as old as a reading of a current may be

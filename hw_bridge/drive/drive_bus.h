@@ -26,6 +26,20 @@ struct BusHealth {
   int8_t stop = bridge_status_t::REASON_NONE;
 };
 
+/// State, DRIVE_* of bridge_status_t, of a drive that reports no more than drive_feedback's.
+constexpr int8_t DriveStateOf(int32_t drive_status) {
+  switch (drive_status) {
+    case drive_feedback_t::DRIVE_DISABLED:
+      return bridge_status_t::DRIVE_SWITCH_ON_DISABLED;
+    case drive_feedback_t::DRIVE_ENABLED:
+      return bridge_status_t::DRIVE_ENABLED;
+    case drive_feedback_t::DRIVE_FAULT:
+      return bridge_status_t::DRIVE_FAULT;
+    default:
+      return bridge_status_t::DRIVE_UNKNOWN;
+  }
+}
+
 /// What a drive says of itself beside its feedback.
 struct DriveReport {
   int8_t state = bridge_status_t::DRIVE_UNKNOWN;  ///< DRIVE_*, CiA 402

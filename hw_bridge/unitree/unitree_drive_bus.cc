@@ -147,20 +147,12 @@ void UnitreeDriveBus::TakeMotors() {
     // What is no position is no reading: the supervisor stops at a current that is no number.
     feedback_.current[j] = readable ? MotorCurrent(motor.model, static_cast<double>(state.tau_est))
                                     : std::numeric_limits<double>::quiet_NaN();
-    const bool error = state.motorstate != 0;
-    const bool enabled = state.mode == kMotorEnabled;
-    int32_t status = drive_feedback_t::DRIVE_DISABLED;
-    int8_t shown = bridge_status_t::DRIVE_SWITCH_ON_DISABLED;
-    if (error) {
-      status = drive_feedback_t::DRIVE_FAULT;
-      shown = bridge_status_t::DRIVE_FAULT;
-    } else if (enabled) {
-      status = drive_feedback_t::DRIVE_ENABLED;
-      shown = bridge_status_t::DRIVE_ENABLED;
-    }
-    feedback_.drive_status[j] = status;
+    int32_t& status = feedback_.drive_status[j];
+    status = drive_feedback_t::DRIVE_DISABLED;
+    if (state.mode == kMotorEnabled) status = drive_feedback_t::DRIVE_ENABLED;
+    if (state.motorstate != 0) status = drive_feedback_t::DRIVE_FAULT;
     DriveReport& report = reports_[j];
-    report.state = shown;
+    report.state = DriveStateOf(status);
     const int hottest = std::max<int>(state.temperature[0], state.temperature[1]);
     const auto voltage = static_cast<double>(state.vol);
     report.stop = bridge_status_t::REASON_NONE;

@@ -44,6 +44,12 @@ inline SupervisorConfig ThreeJoints() {
   config.thresholds.frozen_torque = kInfinity;
   config.thresholds.torque_error = kInfinity;
   config.thresholds.damping.assign(config.motors.size(), 20);
+  config.lower.assign(config.motors.size(), -kInfinity);
+  for (std::vector<double>* limit :
+       {&config.upper, &config.velocity_limit, &config.thresholds.stiffness_limit,
+        &config.thresholds.damping_limit}) {
+    limit->assign(config.motors.size(), kInfinity);
+  }
   return config;
 }
 
