@@ -105,9 +105,6 @@ void HwBridge::Configure(const ComponentContext& context, Wiring* wiring) {
     throw ConfigError("command_deadline", "must be sense_deadline or more");
   }
   model_ = LoadRobot(context);
-  const int n = model_->num_joints();
-  const int feet = static_cast<int>(model_->feet().size());
-
   SupervisorConfig supervisor = MakeSupervisorConfig(config, *model_, context.tick_period);
   MakeBus(config, context.tick_period);
   supervisor.drive_impedance = (own_bus_ ? *own_bus_ : simulated_bus_).impedance();
@@ -115,27 +112,30 @@ void HwBridge::Configure(const ComponentContext& context, Wiring* wiring) {
   enable_at_start_ = config.enable_at_start();
   enable_cycles_ = config.enable_cycles();
   AddPorts(config, wiring);
-  MessageTraits<drive_command_t>::Resize(command_, MessageCounts{n});
-  MessageTraits<drive_feedback_t>::Resize(feedback_, MessageCounts{n, feet});
+  MessageTraits<drive_feedback_t>::Resize(feedback_, JointAndFootCounts(*model_));
 }
 
 void HwBridge::AddPorts(const HwBridgeConfig& config, Wiring* wiring) {
   const int n = model_->num_joints();
-  const int feet = static_cast<int>(model_->feet().size());
-  if (!all_sensors_) wiring->AddInput(&drive_feedback_, "drive_feedback", {n, feet});
-  wiring->AddInput(&joint_command_, "joint_command", {n, feet});
+  const MessageCounts counts = JointAndFootCounts(*model_);
+  std::vector<InputPort*> senses;
+  if (!all_sensors_) {
+    wiring->AddInput(&drive_feedback_, "drive_feedback", counts);
+    senses.push_back(&drive_feedback_);
+  }
+  wiring->AddInput(&joint_command_, "joint_command", counts);
   wiring->AddInput(&emergency_stop_, "emergency_stop", {}, InputKind::kLatest);
-  wiring->AddOutput(&robot_sensors_, "robot_sensors", {n, feet});
+  wiring->AddOutput(&robot_sensors_, "robot_sensors", counts);
   wiring->AddOutput(&drive_command_, "drive_command", {n});
   wiring->AddOutput(&bridge_status_, "bridge_status", {n});
-  if (own_bus_) wiring->AddOutput(&bus_status_, "bus_status", {own_bus_->num_slaves()});
-  std::vector<InputPort*> senses;
-  if (!all_sensors_) senses.push_back(&drive_feedback_);
+  std::vector<OutputPort*> acts = {&drive_command_, &bridge_status_};
+  if (own_bus_) {
+    wiring->AddOutput(&bus_status_, "bus_status", {own_bus_->num_slaves()});
+    acts.push_back(&bus_status_);
+  }
   wiring->AddStage(
       "sense", std::move(senses), {&robot_sensors_}, [this](const Tick& tick) { Sense(tick); },
       config.sense_deadline());
-  std::vector<OutputPort*> acts = {&drive_command_, &bridge_status_};
-  if (own_bus_) acts.push_back(&bus_status_);
   wiring->AddStage(
       "actuate", {&joint_command_, &emergency_stop_}, std::move(acts),
       [this](const Tick& tick) { Actuate(tick); }, config.command_deadline());
@@ -154,13 +154,12 @@ void HwBridge::Open() {
 }
 
 void HwBridge::EnableDrives() {
-  const auto waiting = [this] {
+  const auto disabled = [](const DriveReport& report) {
+    return report.state != bridge_status_t::DRIVE_ENABLED;
+  };
+  const auto waiting = [this, &disabled] {
     const std::span<const DriveReport> reports = bus_->reports();
-    return static_cast<size_t>(std::find_if(reports.begin(), reports.end(),
-                                            [](const DriveReport& report) {
-                                              return report.state != bridge_status_t::DRIVE_ENABLED;
-                                            }) -
-                               reports.begin());
+    return static_cast<size_t>(std::ranges::find_if(reports, disabled) - reports.begin());
   };
   const auto num_joints = static_cast<size_t>(model_->num_joints());
   for (int cycle = 0; waiting() < num_joints; ++cycle) {
@@ -205,9 +204,8 @@ void HwBridge::RunDown() {
   if (const drive_feedback_t* drives = bus_->Receive()) {
     supervisor_->Read(*drives, bus_->reports());
   }
-  bridge_status_t& status = *bridge_status_;
-  supervisor_->Cycle(++last_cycle_, nullptr, &command_, &status);
-  bus_->Send(command_);
+  supervisor_->Cycle(++last_cycle_, nullptr, &*drive_command_, &*bridge_status_);
+  bus_->Send(*drive_command_);
 }
 
 const drive_feedback_t* HwBridge::ReadFeedback() {
@@ -256,7 +254,7 @@ void HwBridge::Sense(const Tick& tick) {
     // What was ordered a cycle ago, where the drive does not say what flows.
     sensors.joint_torque[j] = motors[j].current_sensor
                                   ? JointTorque(motors[j], feedback->current[j])
-                                  : supervisor_->OrderedTorque(j, command_);
+                                  : supervisor_->OrderedTorque(j, *drive_command_);
   }
   std::ranges::copy(feedback->imu_angular_velocity, sensors.imu_angular_velocity);
   std::ranges::copy(feedback->imu_acceleration, sensors.imu_acceleration);
@@ -303,15 +301,9 @@ void HwBridge::Actuate(const Tick& tick) {
   // The runner stamps every output with the run that this process belongs to.
   supervisor_->SetRun(bridge_status_->run_id);
   CheckOperator();
-  supervisor_->Cycle(tick.index, joint_command_.present() ? &*joint_command_ : nullptr, &command_,
-                     &*bridge_status_);
+  supervisor_->Cycle(tick.index, joint_command_.present() ? &*joint_command_ : nullptr,
+                     &*drive_command_, &*bridge_status_);
   last_cycle_ = tick.index;
-  drive_command_->current = command_.current;
-  drive_command_->enabled = command_.enabled;
-  drive_command_->position = command_.position;
-  drive_command_->velocity = command_.velocity;
-  drive_command_->stiffness = command_.stiffness;
-  drive_command_->damping = command_.damping;
   if (!bus_) return;
   if (bus_->num_slaves() > 0) {
     bus_->Diagnose(&*bus_status_);
@@ -320,7 +312,7 @@ void HwBridge::Actuate(const Tick& tick) {
       std::fill_n(bus_status_->clock_difference.begin(), bus_status_->num_slaves, 0);
     }
   }
-  bus_->Send(command_);
+  bus_->Send(*drive_command_);
   if (supervisor_->TakeReset()) bus_->RequestFaultReset();
 }
 

@@ -70,7 +70,6 @@ class HwBridge : public Component {
   std::unique_ptr<DriveBus> own_bus_;
   DriveBus* bus_ = nullptr;  // one of the two; the own one from Open on
   std::unique_ptr<Supervisor> supervisor_;
-  drive_command_t command_;
   drive_feedback_t feedback_;
   bool simulated_time_ = true, enable_at_start_ = false, open_ = false;
   bool all_sensors_ = false;  // are the own bus's
