@@ -4,10 +4,11 @@
 
 #include <algorithm>
 #include <cctype>
-#include <chrono>
 #include <map>
 #include <mutex>
 #include <string>
+
+#include "components/framework/clock.h"
 
 namespace poise::unitree {
 namespace {
@@ -37,12 +38,6 @@ std::string Configuration(const DdsLink& link) {
 }
 
 }  // namespace
-
-int64_t MonotonicNow() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
 
 /// A domain of this process, gone with its last participant.
 class Participant::Domain {
@@ -143,7 +138,7 @@ bool Endpoint::TakeSample(void* sample, int64_t* sent) {
 
 bool Endpoint::AwaitSample(int64_t deadline) {
   dds_attach_t ignored[1];
-  const int64_t left = std::max<int64_t>(0, deadline - MonotonicNow());
+  const int64_t left = std::max<int64_t>(0, deadline - NowNanoseconds());
   return dds_waitset_wait(waitset_, ignored, 1, left) > 0;
 }
 

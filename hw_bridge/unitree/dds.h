@@ -11,9 +11,6 @@
 
 namespace poise::unitree {
 
-/// ns, of a clock that only goes forward.
-int64_t MonotonicNow();
-
 /// Takes part in a domain, on one network interface, until it is destroyed. CYCLONEDDS_URI has no
 /// say. Participants of one process share a domain's configuration, which must be the same.
 class Participant {
@@ -47,7 +44,7 @@ class Endpoint {
   bool WriteSample(const void* sample);
   /// `sent`, unless null: when its writer gave it away, ns since the epoch by the writer's clock.
   bool TakeSample(void* sample, int64_t* sent);
-  /// Waits until a sample is there, at most until `deadline` of MonotonicNow. True: there is one.
+  /// Waits until a sample is there, at most until `deadline` of NowNanoseconds. True: there is one.
   bool AwaitSample(int64_t deadline);
 
  private:
@@ -95,7 +92,7 @@ class Reader : private Endpoint {
   /// The next sample that has come, if there is one. `sent`, where given: when its writer gave it
   /// away, ns since the epoch by the writer's clock.
   bool Take(T* sample, int64_t* sent = nullptr) { return TakeSample(sample, sent); }
-  /// Whether there is one, at the latest at the deadline of MonotonicNow.
+  /// Whether there is one, at the latest at the deadline of NowNanoseconds.
   bool Await(int64_t deadline) { return AwaitSample(deadline); }
 };
 

@@ -16,7 +16,7 @@ DdsRobotLink::DdsRobotLink(const DdsLink& link)
       torso_imu_(participant_, kTorsoImuTopic),
       requests_(participant_, kSwitcherRequestTopic, kSwitcherDepth),
       responses_(participant_, kSwitcherResponseTopic, kSwitcherDepth),
-      last_id_(MonotonicNow()) {}
+      last_id_(NowNanoseconds()) {}
 
 DdsRobotLink::~DdsRobotLink() {
   dds_sample_free(&response_, kDescriptor<Response>, DDS_FREE_CONTENTS);
@@ -32,14 +32,14 @@ bool DdsRobotLink::Receive(LowState* state, int64_t deadline) {
 std::optional<std::string> DdsRobotLink::Call(int64_t api, int64_t deadline) {
   const int64_t first = last_id_ + 1;
   std::string parameter = "{}";
-  while (MonotonicNow() < deadline) {
+  while (NowNanoseconds() < deadline) {
     Request request{};
     request.header.identity.id = ++last_id_;
     request.header.identity.api_id = api;
     request.parameter = parameter.data();
     requests_.Write(request);
-    const int64_t again = std::min(deadline, MonotonicNow() + kRepeat);
-    while (MonotonicNow() < again) {
+    const int64_t again = std::min(deadline, NowNanoseconds() + kRepeat);
+    while (NowNanoseconds() < again) {
       if (!responses_.Await(again)) continue;
       if (!responses_.Take(&response_)) continue;
       const auto& header = response_.header;

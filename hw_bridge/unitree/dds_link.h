@@ -1,6 +1,7 @@
 // The robot on DDS.
 #pragma once
 
+#include "components/framework/clock.h"
 #include "hw_bridge/unitree/dds.h"
 #include "hw_bridge/unitree/motion_switcher.h"
 #include "hw_bridge/unitree/robot_link.h"
@@ -13,7 +14,7 @@ class DdsRobotLink final : public RobotLink {
   explicit DdsRobotLink(const DdsLink& link);
   ~DdsRobotLink() override;
 
-  int64_t Now() const override { return MonotonicNow(); }
+  int64_t Now() const override { return NowNanoseconds(); }
   bool Send(const LowCmd& command) override { return commands_.Write(command); }
   bool Receive(LowState* state, int64_t deadline) override;
   bool ReceiveTorsoImu(ImuState* imu) override { return torso_imu_.Take(imu); }

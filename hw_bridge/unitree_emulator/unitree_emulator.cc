@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "components/framework/clock.h"
 #include "components/messages/robot_resource.h"
 #include "hw_bridge/drive/units.h"
 #include "hw_bridge/unitree_emulator/unitree_emulator_type.h"
@@ -113,7 +114,7 @@ void UnitreeEmulator::Sense(const Tick& tick) {
 void UnitreeEmulator::Act(const Tick&) {
   // In simulated time the command that answers this tick's state is on its way.
   if (ends_ && config_.simulated_time() && state_sent_) {
-    const int64_t deadline = unitree::MonotonicNow() + int64_t{config_.command_wait()} * 1'000'000;
+    const int64_t deadline = NowNanoseconds() + int64_t{config_.command_wait()} * 1'000'000;
     while (ends_->commands.Await(deadline)) {
       if (!ends_->commands.Take(&command_)) continue;
       if (command_.reserve[0] < cycle_) continue;  // of an earlier one

@@ -10,6 +10,7 @@
 #include <random>
 #include <thread>
 
+#include "components/framework/clock.h"
 #include "components/robot_files/robot_files.h"
 #include "hw_bridge/unitree/crc.h"
 #include "hw_bridge/unitree/dds.h"
@@ -59,7 +60,7 @@ class CommandSpy {
     int64_t command_sent = 0, next_sent = 0;
     bool waits = false;  // a state, for a command that was sent after it
     while (!end_) {
-      commands_in.Await(unitree::MonotonicNow() + 20'000'000);
+      commands_in.Await(NowNanoseconds() + 20'000'000);
       // However late this process is: each command beside the last state before it.
       while (commands_in.Take(&command, &command_sent)) {
         while (waits || states_in.Take(&next, &next_sent)) {
