@@ -4,9 +4,9 @@
 
 #include "components/framework/configuration/added_fields.h"
 #include "components/framework/configuration/config_error.h"
-#include "hw_bridge/ethercat/ethercat_bus_type.h"
+#include "hw_bridge/ethercat/ethercat_drive_bus.h"
 #include "hw_bridge/hw_bridge.pb.h"
-#include "hw_bridge/unitree/unitree_bus_type.h"
+#include "hw_bridge/unitree/unitree_drive_bus.h"
 
 namespace poise {
 namespace {

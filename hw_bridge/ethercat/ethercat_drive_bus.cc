@@ -1,12 +1,16 @@
 #include "hw_bridge/ethercat/ethercat_drive_bus.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
 #include <utility>
 
+#include "components/framework/configuration/config_error.h"
 #include "components/framework/say_error.h"
+#include "hw_bridge/ethercat/links/socket_link.h"
 #include "poise/message_traits.hpp"
 
 namespace poise::ethercat {
@@ -95,9 +99,7 @@ EthercatDriveBus::EthercatDriveBus(LinkOpener open_link, const EthercatBusConfig
     const DriveScale scale(motor, *place);
     drives_.push_back({.slave = static_cast<size_t>(place - complete.drive().begin()),
                        .scale = scale,
-                       .max_torque = scale.LimitPerMille(motor.peak_current),
-                       .control = {},
-                       .counter = {}});
+                       .max_torque = scale.LimitPerMille(motor.peak_current)});
   }
   const int32_t counts[] = {model.num_joints(), static_cast<int32_t>(model.feet().size())};
   MessageTraits<drive_feedback_t>::Resize(feedback_, counts);
@@ -334,6 +336,31 @@ void EthercatDriveBus::RequestFaultReset() {
     if (!drive.commanded) drive.control.RequestFaultReset();
   }
   judge_.Reset(&health_);
+}
+
+DriveBusType EthercatBusType() {
+  return EthercatBusType(
+      [](const LinkConfig& config) { return OpenLink(config, SocketLink::Side::kMaster); });
+}
+
+DriveBusType EthercatBusType(LinkOpener open_link) {
+  const auto make = [open_link = std::move(open_link)](
+                        EthercatBusConfig config, const robot::RobotModel& model, double period) {
+    const auto cycle = static_cast<uint32_t>(std::llround(period * 1e9));
+    if (config.master().has_cycle() && config.master().cycle() != cycle) {
+      throw ConfigError("master.cycle",
+                        fmt::format("must be the run's period, {} ns, or be left out", cycle));
+    }
+    config.mutable_master()->set_cycle(cycle);
+    return std::make_unique<EthercatDriveBus>(open_link, config, model);
+  };
+  return {.name = "ethercat",
+          .config = EthercatBusConfig::descriptor(),
+          .make = MakerOf<EthercatBusConfig>(make),
+          .link = {.link = "link",
+                   .simulated_time = "simulated_time",
+                   .profile = "master.profile",
+                   .capture = "capture"}};
 }
 
 }  // namespace poise::ethercat

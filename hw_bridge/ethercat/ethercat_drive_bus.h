@@ -11,6 +11,7 @@
 #include "components/robot/robot_model.h"
 #include "hw_bridge/drive/cycle_judge.h"
 #include "hw_bridge/drive/drive_bus.h"
+#include "hw_bridge/drive/drive_bus_type.h"
 #include "hw_bridge/ethercat/cia402.h"
 #include "hw_bridge/ethercat/drive_scale.h"
 #include "hw_bridge/ethercat/links/pcap.h"
@@ -65,8 +66,8 @@ class EthercatDriveBus final : public DriveBus {
     size_t slave = 0;  // its place in the chain
     DriveScale scale;
     uint16_t max_torque = 0;  // per mille, of the peak current
-    DriveControl control;
-    CounterUnwrap counter;
+    DriveControl control = {};
+    CounterUnwrap counter = {};
     DriveState state = DriveState::kUnknown;
     bool in_mode = false;    // cyclic synchronous torque is the mode it shows
     bool commanded = false;  // to be enabled
@@ -106,5 +107,10 @@ class EthercatDriveBus final : public DriveBus {
   int64_t short_counters_before_ = 0;
   int64_t cycle_start_ = 0, cycle_correction_ = 0;
 };
+
+/// hw_bridge.ethercat, on sockets.
+DriveBusType EthercatBusType();
+/// Opens its link by `open_link`, in place of a socket's.
+DriveBusType EthercatBusType(LinkOpener open_link);
 
 }  // namespace poise::ethercat

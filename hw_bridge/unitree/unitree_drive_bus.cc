@@ -10,6 +10,7 @@
 
 #include "hw_bridge/drive/units.h"
 #include "hw_bridge/unitree/crc.h"
+#include "hw_bridge/unitree/dds_link.h"
 #include "hw_bridge/unitree/motor_slots.h"
 #include "hw_bridge/unitree/remote.h"
 #include "poise/message_traits.hpp"
@@ -294,6 +295,23 @@ void UnitreeDriveBus::Diagnose(bus_status_t* status) const {
     status->temperature[j] = std::max<int>(state.temperature[0], state.temperature[1]);
     status->voltage[j] = std::isfinite(state.vol) ? static_cast<double>(state.vol) : 0.0;
   }
+}
+
+DriveBusType UnitreeBusType() {
+  return UnitreeBusType([](const DdsLink& link) { return std::make_unique<DdsRobotLink>(link); });
+}
+
+DriveBusType UnitreeBusType(RobotLinkOpener open_link) {
+  const auto make = [open_link = std::move(open_link)](const UnitreeBusConfig& config,
+                                                       const robot::RobotModel& model,
+                                                       double period) {
+    return std::make_unique<UnitreeDriveBus>(open_link, config, model, period);
+  };
+  return {.name = "unitree",
+          .config = UnitreeBusConfig::descriptor(),
+          .make = MakerOf<UnitreeBusConfig>(make),
+          .all_sensors = "follow_robot",
+          .link = {.simulated_time = "simulated_time", .tag = "link.tag"}};
 }
 
 }  // namespace poise::unitree

@@ -10,6 +10,7 @@
 #include "components/robot/robot_model.h"
 #include "hw_bridge/drive/cycle_judge.h"
 #include "hw_bridge/drive/drive_bus.h"
+#include "hw_bridge/drive/drive_bus_type.h"
 #include "hw_bridge/unitree/robot_link.h"
 #include "hw_bridge/unitree/unitree.pb.h"
 
@@ -87,5 +88,10 @@ class UnitreeDriveBus final : public DriveBus {
   bool fresh_ = false;
   int64_t cycle_start_ = 0, cycle_correction_ = 0;
 };
+
+/// hw_bridge.unitree, on DDS.
+DriveBusType UnitreeBusType();
+/// Opens its link by `open_link`, in place of DDS.
+DriveBusType UnitreeBusType(RobotLinkOpener open_link);
 
 }  // namespace poise::unitree

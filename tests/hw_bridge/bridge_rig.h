@@ -8,7 +8,7 @@
 
 #include "components/robot_files/robot_files.h"
 #include "hw_bridge/ethercat/emulator/emulated_chain.h"
-#include "hw_bridge/ethercat/ethercat_bus_type.h"
+#include "hw_bridge/ethercat/ethercat_drive_bus.h"
 #include "hw_bridge/ethercat/links/faulty_link.h"
 #include "hw_bridge/ethercat/links/memory_link.h"
 #include "tests/hw_bridge/bridge_bench.h"

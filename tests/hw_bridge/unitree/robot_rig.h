@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "components/messages/robot_resource.h"
-#include "hw_bridge/ethercat/ethercat_bus_type.h"
+#include "hw_bridge/ethercat/ethercat_drive_bus.h"
 #include "hw_bridge/unitree/crc.h"
 #include "hw_bridge/unitree/motor_slots.h"
-#include "hw_bridge/unitree/unitree_bus_type.h"
+#include "hw_bridge/unitree/unitree_drive_bus.h"
 #include "tests/hw_bridge/bridge_bench.h"
 
 namespace poise {
