@@ -64,9 +64,6 @@ void DriveEmulator::Shaft::SetCounts(int64_t counts, double seconds) {
   known_ = true;
 }
 
-DriveEmulator::DriveEmulator() = default;
-DriveEmulator::~DriveEmulator() = default;
-
 void DriveEmulator::Configure(const ComponentContext& context, Wiring* wiring) {
   const auto config = context.config<DriveEmulatorConfig>();
   const std::shared_ptr<const robot::RobotModel> model = LoadRobot(context);

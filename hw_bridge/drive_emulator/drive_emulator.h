@@ -22,9 +22,6 @@ namespace poise {
 /// answered whenever they come.
 class DriveEmulator final : public Component, private Device {
  public:
-  DriveEmulator();
-  ~DriveEmulator() override;
-
   /// Resources "robot", "urdf"; configuration DriveEmulatorConfig.
   void Configure(const ComponentContext& context, Wiring* wiring) override;
   void Open() override;

@@ -23,37 +23,22 @@ bool Overlap(size_t a, size_t a_size, size_t b, size_t b_size) {
 /// Which registers the master may write.
 const std::array<bool, kRegisters>& Writable() {
   static const std::array<bool, kRegisters> table = [] {
+    constexpr std::pair<size_t, size_t> kAreas[] = {
+        {reg::kStationAddress, 2}, {reg::kDlControl, 4},           {reg::kAlControl, 2},
+        {reg::kEventMask, 2},      {reg::kReceiveErrors, 8},       {reg::kForwardedErrors, 4},
+        {reg::kUnitErrors, 2},     {reg::kLostLinks, 4},           {reg::kWatchdogDivider, 2},
+        {reg::kWatchdogPdi, 2},    {reg::kWatchdogProcessData, 2}, {reg::kWatchdogCounter, 2},
+        {reg::kEepromConfig, 1},   {reg::kEepromControl, 14},      {reg::kDcReceiveTime, 4},
+        {reg::kDcSystemTime, 8},   {reg::kDcOffset, 12},           {reg::kDcSpeedStart, 2},
+        {reg::kDcTimeFilter, 2},   {reg::kDcCyclicUnit, 2},        {reg::kDcStart, 24}};
     std::array<bool, kRegisters> result{};
-    const auto allow = [&](size_t first, size_t count) {
-      std::fill_n(result.begin() + static_cast<std::ptrdiff_t>(first), count, true);
-    };
-    allow(reg::kStationAddress, 2);
-    allow(reg::kDlControl, 4);
-    allow(reg::kAlControl, 2);
-    allow(reg::kEventMask, 2);
-    allow(reg::kReceiveErrors, 8);
-    allow(reg::kForwardedErrors, 4);
-    allow(reg::kUnitErrors, 2);
-    allow(reg::kLostLinks, kNumPorts);
-    allow(reg::kWatchdogDivider, 2);
-    allow(reg::kWatchdogPdi, 2);
-    allow(reg::kWatchdogProcessData, 2);
-    allow(reg::kWatchdogCounter, 2);
-    allow(reg::kEepromConfig, 1);
-    allow(reg::kEepromControl, 14);
-    allow(reg::kFmmu, kNumFmmus * kFmmuSize);
-    for (int i = 0; i < kNumSyncManagers; ++i) {
-      const size_t base = reg::kSyncManager + static_cast<size_t>(i) * kSyncManagerSize;
-      allow(base, 5);      // start, length, control
-      allow(base + 6, 1);  // activate
+    for (const auto& [first, bytes] : kAreas) std::fill_n(&result[first], bytes, true);
+    std::fill_n(&result[reg::kFmmu], kNumFmmus * kFmmuSize, true);
+    for (size_t i = 0; i < kNumSyncManagers; ++i) {
+      const size_t base = reg::kSyncManager + i * kSyncManagerSize;
+      std::fill_n(&result[base], 5, true);  // start, length, control
+      result[base + 6] = true;              // activate
     }
-    allow(reg::kDcReceiveTime, 4);
-    allow(reg::kDcSystemTime, 8);
-    allow(reg::kDcOffset, 12);
-    allow(reg::kDcSpeedStart, 2);
-    allow(reg::kDcTimeFilter, 2);
-    allow(reg::kDcCyclicUnit, 2);
-    allow(reg::kDcStart, 24);
     return result;
   }();
   return table;
