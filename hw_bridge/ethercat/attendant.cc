@@ -29,7 +29,7 @@ Attendant::Attendant(const MasterConfig* config, const SlaveSetup* setup, ClockP
       complaints_(slaves.size()) {
   for (const SlaveAccess& slave : slaves) {
     slaves_.push_back(slave.Through(&transactions_));
-    diagnoses_.emplace_back().al = static_cast<uint8_t>(AlState::kOp);
+    diagnoses_.emplace_back().al = {.status = static_cast<uint8_t>(AlState::kOp)};
   }
   thread_ = std::thread([this] { Run(); });
 }
@@ -87,7 +87,7 @@ bool Attendant::NoteState(size_t slave) {
   const auto counter =
       transactions_.Execute(Command::kFprd, slaves_[slave].station(), reg::kAlStatus, bytes, 1);
   shown.online = counter && *counter == 1;
-  if (shown.online) shown.al = uint32_t{bytes[0]} | uint32_t{Get<uint16_t>(bytes, 4)} << 16;
+  if (shown.online) shown.al = {.status = bytes[0], .code = Get<uint16_t>(bytes, 4)};
   const bool operational = shown.online && bytes[0] == static_cast<uint8_t>(AlState::kOp);
   if (operational) complaints_[slave].clear();
   return operational;
@@ -117,15 +117,13 @@ void Attendant::NoteDetails(size_t slave, int turn) {
       return;
     case 2:
       access.PollMailbox();
-      shown.emergencies = access.emergencies();
-      shown.emergency = access.last_emergency().code;
-      return;
+      break;
     default:
       if (setup_->slave(slave).drive == nullptr) return;
       shown.error_code = static_cast<uint16_t>(access.Upload({object::kErrorCode, 0}));
-      shown.emergencies = access.emergencies();
-      shown.emergency = access.last_emergency().code;
   }
+  shown.emergencies = access.emergencies();
+  shown.emergency = access.last_emergency().code;
 }
 
 void Attendant::Recover(size_t slave) {

@@ -17,18 +17,12 @@ namespace poise::ethercat {
 /// What a slave has shown of late; written by the attendant's thread alone.
 struct SlaveDiagnosis {
   struct Al {
-    uint8_t status;
-    uint16_t code;
+    uint8_t status = 0;  ///< register 0x0130, state and 0x10 for an error
+    uint16_t code = 0;   ///< register 0x0134
   };
-  /// Both of the same moment, by one load.
-  Al ReadAl() const {
-    const uint32_t both = al;
-    return {static_cast<uint8_t>(both), static_cast<uint16_t>(both >> 16)};
-  }
 
-  std::atomic<bool> online{true};  ///< it answers
-  /// Register 0x0130, state and 0x10 for an error, and register 0x0134 above it.
-  std::atomic<uint32_t> al{0};
+  std::atomic<bool> online{true};       ///< it answers
+  std::atomic<Al> al{Al{}};             ///< both of the same moment, by one load
   std::atomic<uint16_t> error_code{0};  ///< 603F; 0 of a slave that is no drive
   std::atomic<uint16_t> emergency{0};   ///< the last one's code
   std::atomic<int64_t> emergencies{0};

@@ -150,7 +150,7 @@ void EthercatDriveBus::Diagnose(bus_status_t* status) const {
     static const SlaveDiagnosis kNone;  // of a chain that nobody looks after
     const SlaveDiagnosis& slave = attendant != nullptr ? attendant->diagnosis(i) : kNone;
     status->online[i] = slave.online ? 1 : 0;
-    const SlaveDiagnosis::Al al = slave.ReadAl();
+    const SlaveDiagnosis::Al al = slave.al;
     status->al_status[i] = al.status;
     status->al_code[i] = al.code;
     status->error_code[i] = slave.error_code;

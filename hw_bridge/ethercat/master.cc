@@ -49,8 +49,6 @@ Master::Master(Link* link, const MasterConfig& config)
   PlaceSlaves();
 }
 
-Master::~Master() = default;
-
 /// Places as the configuration counts them: those of the others first, drives on what is left.
 void Master::PlaceSlaves() {
   const auto count = static_cast<int>(image_.num_slaves());
@@ -242,7 +240,7 @@ void Master::SetUpDistributedClocks() {
     with_clock.push_back(&slaves_[i]);
     delays.push_back(wiring_[at].delay);
   }
-  SetUpClocks(&transactions_, with_clock, delays, transactions_.link()->Now());
+  SetUpClocks(&transactions_, with_clock, delays, Now());
   AwaitClocks();
   for (SlaveAccess* slave : with_clock) {
     StartSync0(slave, config_.cycle(), config_.sync0_shift());
@@ -259,13 +257,13 @@ void Master::AwaitClocks() {
   };
   for (uint32_t i = 0; i < config_.drift_frames(); ++i) compensate();
   // Static drift is gone; whether the clocks agree, they say themselves.
-  const int64_t deadline = transactions_.link()->Now() + timeouts_.state;
+  const int64_t deadline = Now() + timeouts_.state;
   for (size_t i = 0; i < num_slaves(); ++i) {
     if (!clocks_.has_clock[i] || i == clocks_.reference) continue;
     while (true) {
       const int32_t difference = DcDifference(slaves_[i].Read<uint32_t>(reg::kDcDifference));
       if (std::abs(int64_t{difference}) <= config_.clock_tolerance()) break;
-      if (transactions_.link()->Now() > deadline) {
+      if (Now() > deadline) {
         slaves_[i].Fail(
             "its clock is still {} ns off the common time (register 0x092C), {} are allowed",
             difference, config_.clock_tolerance());
@@ -277,19 +275,19 @@ void Master::AwaitClocks() {
 
 CycleResult Master::Pace() {
   Link* link = transactions_.link();
-  if (next_cycle_ + int64_t{config_.cycle()} < link->Now()) next_cycle_ = link->Now();
+  if (next_cycle_ + int64_t{config_.cycle()} < Now()) next_cycle_ = Now();
   // What is asked of slaves meanwhile is asked within the cycle, after its frame.
   std::array<uint8_t, 1> ignored;
   while (link->Receive(ignored, next_cycle_) != 0) ++transactions_.mutable_counts()->unexpected;
   next_cycle_ += config_.cycle();
   static_cast<void>(Send());
-  return Receive(link->Now() + Milliseconds(config_.frame_timeout()));
+  return Receive(Now() + Milliseconds(config_.frame_timeout()));
 }
 
 void Master::GoOperational() {
   std::fill(outputs_.begin(), outputs_.end(), DriveOutputs{});
   operational_ = true;  // from here on there is something to stop
-  next_cycle_ = transactions_.link()->Now();
+  next_cycle_ = Now();
   const auto pace = [this] { static_cast<void>(Pace()); };
   // Slaves enter OP only once they have outputs.
   pace();
@@ -298,11 +296,11 @@ void Master::GoOperational() {
     pace();
   }
   for (SlaveAccess& slave : slaves_) slave.AwaitState(AlState::kOp, pace);
-  const int64_t deadline = transactions_.link()->Now() + timeouts_.state;
+  const int64_t deadline = Now() + timeouts_.state;
   while (true) {
     const CycleResult result = Pace();
     if (result.complete) return;
-    if (transactions_.link()->Now() > deadline) {
+    if (Now() > deadline) {
       throw EthercatError(
           "the process data's working counter is {} instead of {} although all slaves are in OP",
           result.working_counter, result.expected_working_counter);
@@ -325,15 +323,15 @@ bool Master::Stop() {
   }
   operational_ = clocks_.running = false;
   constexpr int64_t kAskAgain = 100 * kMillisecond;
-  const int64_t deadline = transactions_.link()->Now() + timeouts_.state;
+  const int64_t deadline = Now() + timeouts_.state;
   std::array<uint8_t, 2> bytes{};
-  int64_t asked = transactions_.link()->Now() - kAskAgain;
+  int64_t asked = Now() - kAskAgain;
   // A bus from which nothing comes back is not waited for: its watchdogs have acted.
   for (int silent = 0; silent < 2; slaves_[0].Pause()) {
-    if (transactions_.link()->Now() - asked >= kAskAgain) {
+    if (Now() - asked >= kAskAgain) {
       Put<uint16_t>(bytes, 0, static_cast<uint16_t>(AlState::kInit) | kAlError);
       static_cast<void>(transactions_.Execute(Command::kBwr, 0, reg::kAlControl, bytes));
-      asked = transactions_.link()->Now();
+      asked = Now();
     }
     Put<uint16_t>(bytes, 0, 0);
     const auto counter = transactions_.Execute(Command::kBrd, 0, reg::kAlStatus, bytes);
@@ -342,7 +340,7 @@ bool Master::Stop() {
     if (counter && bytes[0] == static_cast<uint8_t>(AlState::kInit)) {
       return *counter == num_slaves();
     }
-    if (transactions_.link()->Now() > deadline) return false;
+    if (Now() > deadline) return false;
   }
   return false;
 }
@@ -386,7 +384,7 @@ bool Master::Send(Exchange exchange) {
     // The reference puts its time in. Should it not be there, the others are told what it would be.
     std::array<uint8_t, 8> time{};
     if (seen_at_ != 0) {
-      Put<int64_t>(time, 0, system_time_ + transactions_.link()->Now() - seen_at_);
+      Put<int64_t>(time, 0, system_time_ + Now() - seen_at_);
     }
     builder_.Add(Command::kFrmw, cyclic_index_, slaves_[clocks_.reference].station(),
                  reg::kDcSystemTime, time);
@@ -394,7 +392,7 @@ bool Master::Send(Exchange exchange) {
   // The attendant's datagram goes with the outputs, whose answer is not waited for within the
   // cycle.
   if (attendant_ && exchange != Exchange::kRead) {
-    attendant_->BeginCycle(transactions_.link()->Now(), trouble_);
+    attendant_->BeginCycle(Now(), trouble_);
     acyclic_ = attendant_->slot().Take();
     if (acyclic_ && !builder_.Add(acyclic_->command, cyclic_index_, acyclic_->adp, acyclic_->ado,
                                   acyclic_->data)) {
@@ -467,7 +465,7 @@ bool Master::Take(const FrameReader& frame, CycleResult* result) {
   if (clock && clock->working_counter > 0) {
     result->system_time = Get<int64_t>(clock->data, 0);
     system_time_ = *result->system_time;
-    seen_at_ = transactions_.link()->Now();
+    seen_at_ = Now();
   }
   if (!result->complete) {
     ++short_working_counters_;

@@ -37,7 +37,6 @@ class Master {
  public:
   /// `link` must outlive this. Throws EthercatError: a configuration that cannot work.
   Master(Link* link, const MasterConfig& config);
-  ~Master();
   /// In place of the link that it was made with, which may have been nullptr; before Start.
   void set_link(Link* link) { transactions_.set_link(link); }
 
@@ -88,6 +87,7 @@ class Master {
   int64_t short_working_counters() const { return short_working_counters_; }
 
  private:
+  int64_t Now() const { return transactions_.link()->Now(); }
   void CheckCount();
   void ResetAndAddress();
   void FindWiring();

@@ -207,25 +207,28 @@ bool SlaveAccess::WriteAlControl(uint8_t control) {
   return *counter == 1;
 }
 
-bool SlaveAccess::TryRequest(AlState state, int64_t deadline) {
-  const AlStatus status = ReadAlStatus();
+void SlaveAccess::RequestState(AlState state, const std::function<void()>& meanwhile) {
   const auto wanted = static_cast<uint8_t>(state);
-  // INIT may be asked for along with the acknowledgement; anything else waits for its effect.
-  const bool at_once = !status.error || state == AlState::kInit;
-  const auto control =
-      static_cast<uint8_t>(at_once ? wanted | (status.error ? kAlError : 0)
-                                   : static_cast<uint8_t>(status.state) | kAlError);
-  if (at_once) {
-    acknowledged_ = false;
-    if (WriteAlControl(control)) return true;
-  } else if (!acknowledged_) {
-    acknowledged_ = WriteAlControl(control);
+  const int64_t deadline = Now() + timeouts_.state;
+  while (true) {
+    const AlStatus status = ReadAlStatus();
+    // INIT may be asked for along with the acknowledgement; anything else waits for its effect.
+    const bool at_once = !status.error || state == AlState::kInit;
+    const auto control =
+        static_cast<uint8_t>(at_once ? wanted | (status.error ? kAlError : 0)
+                                     : static_cast<uint8_t>(status.state) | kAlError);
+    if (at_once) {
+      acknowledged_ = false;
+      if (WriteAlControl(control)) return;
+    } else if (!acknowledged_) {
+      acknowledged_ = WriteAlControl(control);
+    }
+    if (Now() > deadline) {
+      acknowledged_ = false;
+      Fail("does not take the request for {}: it is in {}", Name(state), Text(status));
+    }
+    meanwhile ? meanwhile() : Pause();
   }
-  if (Now() > deadline) {
-    acknowledged_ = false;
-    Fail("does not take the request for {}: it is in {}", Name(state), Text(status));
-  }
-  return false;
 }
 
 void SlaveAccess::AwaitInit() {
@@ -263,16 +266,17 @@ std::optional<uint32_t> SlaveAccess::ReadIdentification() {
   return found;
 }
 
-bool SlaveAccess::StateReached(AlState state, int64_t deadline) {
-  const AlStatus status = ReadAlStatus();
-  if (status.error) {
-    Fail("does not change to {}: it is in {}", Name(state), Text(status));
+void SlaveAccess::AwaitState(AlState state, const std::function<void()>& meanwhile) {
+  const int64_t deadline = Now() + timeouts_.state;
+  while (true) {
+    const AlStatus status = ReadAlStatus();
+    if (status.error) Fail("does not change to {}: it is in {}", Name(state), Text(status));
+    if (status.state == state) return;
+    if (Now() > deadline) {
+      Fail("has not changed to {} by the timeout: it is in {}", Name(state), Text(status));
+    }
+    meanwhile ? meanwhile() : Pause();
   }
-  if (status.state == state) return true;
-  if (Now() > deadline) {
-    Fail("has not changed to {} by the timeout: it is in {}", Name(state), Text(status));
-  }
-  return false;
 }
 
 bool SlaveAccess::SetUpMailbox() {

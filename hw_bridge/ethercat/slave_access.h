@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -113,29 +114,19 @@ class SlaveAccess {
   /// "SAFE-OP with error 0x001B (sync manager watchdog)"
   static std::string Text(const AlStatus& status);
   /// Requests a state without waiting for it. An error is acknowledged first, and the request
-  /// follows once the slave has taken the acknowledgement back; `meanwhile` runs between looks.
-  template <class Meanwhile>
-  void RequestState(AlState state, Meanwhile meanwhile) {
-    const int64_t deadline = Now() + timeouts_.state;
-    while (!TryRequest(state, deadline)) meanwhile();
-  }
-  void RequestState(AlState state) {
-    RequestState(state, [this] { Pause(); });
-  }
+  /// follows once the slave has taken the acknowledgement back; `meanwhile` runs between looks,
+  /// Pause where it is not given.
+  void RequestState(AlState state, const std::function<void()>& meanwhile = nullptr);
   /// Waits for INIT from whatever state, for which an error from before is no obstacle.
   void AwaitInit();
-  /// Waits for the state; `meanwhile` runs between looks. Throws with the AL status code's name
-  /// when the slave refuses, or at the timeout.
-  template <class Meanwhile>
-  void AwaitState(AlState state, Meanwhile meanwhile) {
-    const int64_t deadline = Now() + timeouts_.state;
-    while (!StateReached(state, deadline)) meanwhile();
-  }
+  /// Waits for the state; `meanwhile` likewise. Throws with the AL status code's name when the
+  /// slave refuses, or at the timeout.
+  void AwaitState(AlState state, const std::function<void()>& meanwhile = nullptr);
   /// Lets a little time pass between two looks at the bus.
   void Pause();
   void ChangeState(AlState state) {
     RequestState(state);
-    AwaitState(state, [this] { Pause(); });
+    AwaitState(state);
   }
   /// Throws EthercatError: the slave, and a problem of fmt's pattern.
   template <class... Args>
@@ -175,8 +166,6 @@ class SlaveAccess {
     uint32_t words;
   };
   std::optional<Category> FindCategory(uint16_t wanted);
-  bool StateReached(AlState state, int64_t deadline);
-  bool TryRequest(AlState state, int64_t deadline);
   /// False: the slave has not yet taken what was written there before.
   bool WriteAlControl(uint8_t control);
   /// Waits until the EEPROM is not busy; the error bits it then shows.

@@ -5,8 +5,9 @@
 namespace poise::ethercat {
 
 std::optional<uint16_t> Transactions::Execute(Command command, uint16_t adp, uint16_t ado,
-                                              std::span<uint8_t> data, int attempts) {
-  for (int attempt = 0; attempt < attempts; ++attempt) {
+                                              std::span<uint8_t> data,
+                                              std::optional<int> attempts) {
+  for (int attempt = 0; attempt < attempts.value_or(attempts_); ++attempt) {
     builder_.Clear();
     const Datagram sent{
         .command = command, .index = NextIndex(), .adp = adp, .ado = ado, .data = data};

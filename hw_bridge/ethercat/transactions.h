@@ -28,13 +28,10 @@ class Transactions {
   Transactions(Link* link, int64_t timeout, int attempts)
       : link_(link), timeout_(timeout), attempts_(attempts) {}
 
-  /// Working counter; `data` becomes what came back. nullopt: lost in every attempt.
+  /// Working counter; `data` becomes what came back. nullopt: lost in every attempt. `attempts`: in
+  /// place of those given at the start.
   std::optional<uint16_t> Execute(Command command, uint16_t adp, uint16_t ado,
-                                  std::span<uint8_t> data) {
-    return Execute(command, adp, ado, data, attempts_);
-  }
-  std::optional<uint16_t> Execute(Command command, uint16_t adp, uint16_t ado,
-                                  std::span<uint8_t> data, int attempts);
+                                  std::span<uint8_t> data, std::optional<int> attempts = {});
 
   /// The index for the next frame, for frames that are sent elsewhere on the same link.
   uint8_t NextIndex() { return ++index_; }

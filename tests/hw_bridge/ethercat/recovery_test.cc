@@ -140,7 +140,7 @@ TEST(EthercatRecovery, TellsWhatSlavesSayOfThemselves) {
   bench.Cycles(1);
   const Attendant& attendant = *bench.master->attendant();
   const SlaveDiagnosis& fault = attendant.diagnosis(1);
-  EXPECT_EQ(fault.ReadAl().status, kOp);
+  EXPECT_EQ(fault.al.load().status, kOp);
   EXPECT_EQ(fault.error_code, kErrorOverCurrent);
   EXPECT_EQ(fault.emergency, kErrorOverCurrent);
   EXPECT_EQ(fault.emergencies, 1);
