@@ -152,7 +152,6 @@ void Attendant::Recover(size_t slave) {
   }
   if (!NoteState(slave)) return;
   ++shown.recoveries;
-  ++recoveries_;
   if (say_) say_(fmt::format("{}: is in OP again", access.Describe()));
 }
 
@@ -193,7 +192,7 @@ void Attendant::Rejoin(size_t slave) {
                                       {reg::kSyncManager, 4 * kSyncManagerSize}}) {
     access.Write(address, std::span(kZeros).first(size));
   }
-  static_cast<void>(setup_->Check(slave, &access));
+  setup_->Check(slave, &access);
   setup_->Configure(slave, &access);
   if (clocks_.running && clocks_.has_clock[slave]) StartClock(slave);
   access.ChangeState(AlState::kSafeOp);

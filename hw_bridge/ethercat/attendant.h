@@ -59,8 +59,6 @@ class Attendant {
   /// A cycle begins at `now`, ns. `trouble`: not all slaves are in OP, or not all have answered.
   void BeginCycle(int64_t now, bool trouble);
   const SlaveDiagnosis& diagnosis(size_t slave) const { return diagnoses_[slave]; }
-  /// All slaves' recoveries.
-  int64_t recoveries() const { return recoveries_.load(std::memory_order_relaxed); }
 
  private:
   void Run();
@@ -86,7 +84,6 @@ class Attendant {
   std::deque<SlaveDiagnosis> diagnoses_;
   std::vector<std::string> complaints_;  // the last line of each slave
   std::atomic<bool> trouble_{false}, ended_{false};
-  std::atomic<int64_t> recoveries_{0};
   std::thread thread_;
 };
 

@@ -57,9 +57,6 @@ class EthercatDriveBus final : public DriveBus {
   int num_slaves() const override { return static_cast<int>(master_.num_slaves()); }
   void Diagnose(bus_status_t* status) const override;
   SensorsOfBus sensors() const override { return sensors_; }
-  /// The state of a joint's drive, as last received.
-  DriveState drive_state(size_t joint) const { return drives_[joint].state; }
-  const Master& master() const { return master_; }
 
  private:
   struct Drive {

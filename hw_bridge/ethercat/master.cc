@@ -42,7 +42,6 @@ Master::Master(Link* link, const MasterConfig& config)
       timeouts_{.eeprom = Milliseconds(config.eeprom_timeout()),
                 .mailbox = Milliseconds(config.mailbox_timeout()),
                 .state = Milliseconds(config.state_timeout())},
-      identities_(image_.num_slaves()),
       outputs_(static_cast<size_t>(config.drive_size())),
       inputs_(static_cast<size_t>(config.drive_size())),
       image_bytes_(image_.size(), 0) {
@@ -100,7 +99,7 @@ void Master::Start() {
   FindWiring();
   FindPositions();
   for (size_t i = 0; i < num_slaves(); ++i) {
-    identities_[i] = setup_.Check(i, &slaves_[i]);
+    setup_.Check(i, &slaves_[i]);
     setup_.Configure(i, &slaves_[i]);
   }
   clocks_.has_clock.assign(num_slaves(), false);

@@ -81,8 +81,6 @@ class Master {
   uint64_t input(const ProcessImage::Place& place) const {
     return GetBits(image_bytes_, place.bit, place.bits);
   }
-  /// What the drive said at the start that it is.
-  const Identity& identity(size_t drive) const { return identities_[drive]; }
   const FrameCounts& counts() const { return transactions_.counts(); }
   int64_t short_working_counters() const { return short_working_counters_; }
 
@@ -118,7 +116,6 @@ class Master {
   Transactions transactions_;
   Timeouts timeouts_;
   std::vector<SlaveAccess> slaves_;
-  std::vector<Identity> identities_;
   std::vector<int> positions_;      // by slave
   std::vector<SlavePlace> wiring_;  // by position
   ClockPlan clocks_;

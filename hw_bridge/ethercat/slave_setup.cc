@@ -63,7 +63,7 @@ SlaveSetup::SlaveSetup(const MasterConfig* config, const ProcessImage* image)
   for (const OtherSlave& other : config->other()) add(other.name(), other.profile(), other);
 }
 
-Identity SlaveSetup::Check(size_t slave, SlaveAccess* access) const {
+void SlaveSetup::Check(size_t slave, SlaveAccess* access) const {
   const DriveProfile& profile = *slaves_[slave].profile;
   const Identity identity = access->ReadIdentity();
   const auto compare = [&](std::string_view what, uint32_t found, uint32_t wanted) {
@@ -77,7 +77,6 @@ Identity SlaveSetup::Check(size_t slave, SlaveAccess* access) const {
   if (profile.has_revision()) compare("revision", identity.revision, profile.revision());
   if (const auto& serial = slaves_[slave].serial)
     compare("serial number", identity.serial, *serial);
-  return identity;
 }
 
 void SlaveSetup::Configure(size_t slave, SlaveAccess* access) const {

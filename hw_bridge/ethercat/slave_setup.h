@@ -34,7 +34,7 @@ class SlaveSetup {
   const ConfiguredSlave& slave(size_t slave) const { return slaves_[slave]; }
 
   /// Reads the identity of a slave in INIT, which must be the configured one.
-  Identity Check(size_t slave, SlaveAccess* access) const;
+  void Check(size_t slave, SlaveAccess* access) const;
   /// Takes a slave from INIT to PRE-OP and sets up its process data: all that SAFE-OP takes but
   /// clocks.
   void Configure(size_t slave, SlaveAccess* access) const;

@@ -218,7 +218,6 @@ void EmulatedDrive::UpdateTorque(double elapsed_ms) {
   } else {
     torque_ = 0;
   }
-  greatest_torque_ = std::max(greatest_torque_, std::abs(torque_));
   load_->SetTorque(torque_ * 1e-3 * config_.rated_torque() * 1e-3);
 }
 

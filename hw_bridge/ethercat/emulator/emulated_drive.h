@@ -50,8 +50,6 @@ class EmulatedDrive {
   void FreezeEncoder(bool frozen) { frozen_ = frozen; }
 
   DriveState state() const { return state_; }
-  /// The greatest magnitude since the start.
-  double greatest_torque_per_mille() const { return greatest_torque_; }
   /// A fault's code, once for each fault.
   std::optional<uint16_t> TakeEmergency() { return std::exchange(emergency_, std::nullopt); }
 
@@ -86,8 +84,7 @@ class EmulatedDrive {
   bool sto_ = false, frozen_ = false;
   bool limited_ = false;  // an internal limit holds the torque back
   double torque_ = 0;     // per mille
-  double greatest_torque_ = 0;
-  double heat_ = 0;  // I²t: share of what the motor bears above its rating, 0 to 1
+  double heat_ = 0;       // I²t: share of what the motor bears above its rating, 0 to 1
   bool overheated_ = false;
   std::optional<uint16_t> emergency_;
 };

@@ -1,6 +1,8 @@
 // A master and an emulated chain on one clock, for tests.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
@@ -13,14 +15,17 @@
 
 namespace poise::ethercat {
 
-/// A shaft that the test places; keeps the torque it was told.
+/// A shaft that the test places; keeps the torque it was told, and the greatest magnitude.
 class TestLoad final : public MotorLoad {
  public:
-  void SetTorque(double torque) override { torque_ = torque; }
+  void SetTorque(double torque) override {
+    torque_ = torque;
+    greatest_ = std::max(greatest_, std::abs(torque));
+  }
   double position() const override { return position_; }
   double velocity() const override { return velocity_; }
 
-  double torque_ = 0, position_ = 0, velocity_ = 0;
+  double torque_ = 0, greatest_ = 0, position_ = 0, velocity_ = 0;
 };
 
 inline MasterConfig MakeMasterConfig(int drives) {

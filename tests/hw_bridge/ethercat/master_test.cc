@@ -28,8 +28,7 @@ TEST(EthercatMaster, StartsTwelveDrivesWithoutTorque) {
   bench.Start();
   for (size_t i = 0; i < 12; ++i) {
     EXPECT_EQ(bench.chain->slave(i).al_state(), AlState::kOp);
-    EXPECT_EQ(bench.master->identity(i).serial, 100 + i);
-    EXPECT_EQ(bench.chain->slave(i).drive().greatest_torque_per_mille(), 0);
+    EXPECT_EQ(bench.loads[i].greatest_, 0);
     EXPECT_EQ(bench.chain->slave(i).objects().Find({object::kMaxTorque, 0})->value, 0U);
   }
   const CycleResult result = bench.Cycle();
@@ -40,6 +39,9 @@ TEST(EthercatMaster, StartsTwelveDrivesWithoutTorque) {
   EXPECT_EQ(result.al_status, kAllOp);
   ASSERT_TRUE(result.system_time.has_value());
   EXPECT_EQ(bench.State(5), DriveState::kSwitchOnDisabled);
+  for (size_t i = 0; i < 12; ++i) {
+    EXPECT_EQ(bench.master->slave(i).ReadIdentity().serial, 100 + i);
+  }
 }
 
 TEST(EthercatMaster, StartsFromAnyStateAndStopsToInit) {

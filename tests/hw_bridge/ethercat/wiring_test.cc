@@ -149,7 +149,7 @@ TEST(EthercatWiring, FindsDrivesByTheirIdentification) {
   bench.Start();
   for (size_t i = 0; i < 3; ++i) {
     EXPECT_EQ(bench.master->position(i), 2 - static_cast<int>(i));
-    EXPECT_EQ(bench.master->identity(i).serial, 102 - i);
+    EXPECT_EQ(bench.master->slave(i).ReadIdentity().serial, 102 - i);
   }
   bench.loads[2].position_ = 1;
   bench.Cycle();
