@@ -10,8 +10,7 @@
 namespace poise::ethercat {
 namespace {
 
-constexpr uint16_t kFirstStation = 1001;  // 0 is the address of a slave that has none
-constexpr uint16_t kEventMask = 0x0004;   // AL events in each datagram, as other masters set it
+constexpr uint16_t kEventMask = 0x0004;  // AL events in each datagram, as other masters set it
 
 const MasterConfig& Checked(const MasterConfig& config) {
   CheckFields(config, "master.");
@@ -71,15 +70,10 @@ void Master::PlaceSlaves() {
   MakeSlaves();
 }
 
-SlaveAccess Master::SlaveAt(int position, const std::string& name) {
-  return {&transactions_, timeouts_, position, static_cast<uint16_t>(kFirstStation + position),
-          name};
-}
-
 void Master::MakeSlaves() {
   slaves_.clear();
   for (size_t i = 0; i < positions_.size(); ++i) {
-    slaves_.push_back(SlaveAt(positions_[i], setup_.slave(i).name));
+    slaves_.emplace_back(&transactions_, timeouts_, positions_[i], setup_.slave(i).name);
   }
 }
 
@@ -204,7 +198,7 @@ void Master::FindPositions() {
   // Every slave says who it is: where it is in the chain does not matter.
   std::vector<int> places(num_slaves(), -1);
   for (size_t at = 0; at < num_slaves(); ++at) {
-    SlaveAccess here = SlaveAt(static_cast<int>(at), "");
+    SlaveAccess here(&transactions_, timeouts_, static_cast<int>(at));
     bool known = false;
     for (size_t i = 0; i < num_slaves() && !known; ++i) {
       if (places[i] >= 0 || read(here, wanted[i].what) != wanted[i].number) continue;

@@ -91,7 +91,6 @@ class Master {
   void FindWiring();
   void FindPositions();
   void PlaceSlaves();
-  SlaveAccess SlaveAt(int position, const std::string& name);
   /// The slaves as positions_ has them.
   void MakeSlaves();
   void SetUpDistributedClocks();

@@ -40,6 +40,8 @@ struct MailboxArea {
   uint16_t offset = 0, size = 0;
 };
 
+inline constexpr uint16_t kFirstStation = 1001;  ///< 0 is the address of a slave that has none
+
 /// A slave's refusal of an SDO, by its code.
 class SdoAbortError : public EthercatError {
  public:
@@ -54,12 +56,13 @@ class SdoAbortError : public EthercatError {
 /// was asked of it and what it answered.
 class SlaveAccess {
  public:
-  SlaveAccess(Transactions* transactions, const Timeouts& timeouts, int position, uint16_t station,
+  /// The slave at a place in the chain, 0 the first, whose station address follows from it.
+  SlaveAccess(Transactions* transactions, const Timeouts& timeouts, int position,
               std::string name = "")
       : transactions_(transactions),
         timeouts_(timeouts),
         position_(position),
-        station_(station),
+        station_(static_cast<uint16_t>(kFirstStation + position)),
         name_(std::move(name)) {}
 
   /// "slave 3 (station 1003, left_knee_pitch)"

@@ -9,7 +9,6 @@
 namespace poise {
 namespace {
 
-constexpr uint16_t kFirstStation = 1001;
 constexpr int64_t kFrameTimeout = 20 * ethercat::kMillisecond;
 constexpr int kAttempts = 3;
 constexpr ethercat::Timeouts kTimeouts = {.eeprom = 200 * ethercat::kMillisecond,
@@ -123,8 +122,7 @@ std::vector<ScannedSlave> ScanChain(ethercat::Link* link) {
   std::vector<ethercat::SlaveAccess> slaves;
   std::vector<ethercat::SlavePorts> ports;
   for (int i = 0; i < *count; ++i) {
-    ethercat::SlaveAccess& slave =
-        slaves.emplace_back(&transactions, kTimeouts, i, static_cast<uint16_t>(kFirstStation + i));
+    ethercat::SlaveAccess& slave = slaves.emplace_back(&transactions, kTimeouts, i);
     static_cast<void>(slave.AssignStation());
     slave.AwaitInit();
     ports.push_back(slave.ReadPorts());

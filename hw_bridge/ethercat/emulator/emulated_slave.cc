@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <boost/crc.hpp>
 
 #include "hw_bridge/ethercat/process_image.h"
 
@@ -18,14 +19,12 @@ uint32_t Mapping(uint16_t index, uint32_t bits) { return uint32_t{index} << 16 |
 
 /// Polynomial x^8 + x^2 + x + 1, begun with 0xFF, over the bytes of `words`.
 uint8_t SiiChecksum(std::span<const uint16_t> words) {
-  uint32_t crc = 0xFF;
+  boost::crc_optimal<8, 0x07, 0xFF, 0, false, false> crc;
   for (const uint16_t word : words) {
-    for (const int shift : {0, 8}) {
-      crc ^= word >> shift & 0xFF;
-      for (int bit = 0; bit < 8; ++bit) crc = (crc << 1 ^ ((crc & 0x80) != 0 ? 0x07 : 0)) & 0xFF;
-    }
+    crc.process_byte(static_cast<uint8_t>(word));
+    crc.process_byte(static_cast<uint8_t>(word >> 8));
   }
-  return static_cast<uint8_t>(crc);
+  return static_cast<uint8_t>(crc.checksum());
 }
 
 /// Appends a category; `bytes` are filled up to whole words.

@@ -85,12 +85,9 @@ SdoAbort ObjectDictionary::Write(ObjectAddress address, std::span<const uint8_t>
   if (data.size() > object->size) return SdoAbort::kLengthTooHigh;
   if (data.size() < object->size) return SdoAbort::kLengthTooLow;
   const auto value = static_cast<uint32_t>(GetSized(data, 0, data.size()));
-  if (object->on_write) {
-    const SdoAbort abort = object->on_write(value);
-    if (abort != SdoAbort::kNone) return abort;
-  }
-  object->value = value;
-  return SdoAbort::kNone;
+  const SdoAbort abort = object->on_write ? object->on_write(value) : SdoAbort::kNone;
+  if (abort == SdoAbort::kNone) object->value = value;
+  return abort;
 }
 
 SdoAbort ObjectDictionary::ReadComplete(ObjectAddress address, std::vector<uint8_t>* data) const {
@@ -114,18 +111,15 @@ SdoAbort ObjectDictionary::WriteComplete(ObjectAddress address, std::span<const 
   if (most < 0) return SdoAbort::kNoObject;
   if (address.subindex > 1) return SdoAbort::kUnsupportedAccess;
   // The count is written last: entries are free only while it is 0.
-  std::optional<uint8_t> count;
-  size_t at = 0;
-  if (address.subindex == 0 && most > 0) {
+  const bool counted = address.subindex == 0 && most > 0;
+  if (counted) {
     if (data.size() < 2) return SdoAbort::kLengthTooLow;
-    count = data[0];
-    at = 2;
     const uint8_t none = 0;
     const SdoAbort abort = Write({address.index, 0}, std::span(&none, 1));
     if (abort != SdoAbort::kNone) return abort;
   }
-  int i = address.subindex == 0 && most > 0 ? 1 : address.subindex;
-  for (; at < data.size(); ++i) {
+  size_t at = counted ? 2 : 0;
+  for (int i = counted ? 1 : address.subindex; at < data.size(); ++i) {
     const Object* object = Find({address.index, static_cast<uint8_t>(i)});
     if (object == nullptr) return SdoAbort::kLengthTooHigh;
     const size_t size = object->size > 0 ? object->size : data.size() - at;
@@ -134,7 +128,7 @@ SdoAbort ObjectDictionary::WriteComplete(ObjectAddress address, std::span<const 
     if (abort != SdoAbort::kNone) return abort;
     at += size;
   }
-  return count ? Write({address.index, 0}, std::span(&*count, 1)) : SdoAbort::kNone;
+  return counted ? Write({address.index, 0}, data.first(1)) : SdoAbort::kNone;
 }
 
 }  // namespace poise::ethercat

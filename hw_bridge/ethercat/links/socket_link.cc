@@ -126,13 +126,9 @@ RawLink::RawLink(const std::string& interface, Side side) : side_(side) {
 
 bool RawLink::Send(std::span<const uint8_t> frame) {
   if (frame.size() > kMaxFrame) return false;
-  std::copy(frame.begin(), frame.end(), out_.begin() + kEthernetHeader);
-  size_t size = kEthernetHeader + frame.size();
-  if (size < kMinEthernet) {
-    std::fill(out_.begin() + static_cast<std::ptrdiff_t>(size), out_.begin() + kMinEthernet,
-              uint8_t{0});
-    size = kMinEthernet;
-  }
+  auto* const end = std::copy(frame.begin(), frame.end(), out_.begin() + kEthernetHeader);
+  if (end < out_.begin() + kMinEthernet) std::fill(end, out_.begin() + kMinEthernet, uint8_t{0});
+  const size_t size = std::max(kEthernetHeader + frame.size(), kMinEthernet);
   return send(socket_, out_.data(), size, MSG_NOSIGNAL) == static_cast<ssize_t>(size);
 }
 

@@ -323,8 +323,8 @@ struct ScriptedAccess {
   explicit ScriptedAccess(ScriptedSlave::Script script)
       : link(std::move(script)),
         transactions(&link, kMillisecond, 3),
-        slave(&transactions, {.eeprom = kSecond, .mailbox = 50 * kMillisecond, .state = kSecond}, 0,
-              1001) {
+        slave(&transactions, {.eeprom = kSecond, .mailbox = 50 * kMillisecond, .state = kSecond},
+              0) {
     EXPECT_TRUE(slave.SetUpMailbox());
   }
   ScriptedSlave link;
