@@ -61,8 +61,10 @@ uint8_t CommandByte(const Sdo& sdo) {
       byte |= static_cast<uint8_t>((kLeastSegment - sdo.data.size()) << 1);
     }
   } else if (Initiates(sdo.command)) {
-    byte |= sdo.size > 0 ? static_cast<uint8_t>(kExpeditedBit | kSizeBit | (4 - sdo.size) << 2)
-                         : kSizeBit;
+    byte |= kSizeBit;
+    if (sdo.expedited) {
+      byte |= static_cast<uint8_t>(kExpeditedBit | (kExpedited - sdo.data.size()) << 2);
+    }
   }
   const bool whole = Initiates(sdo.command) || sdo.command == SdoCommand::kUploadRequest ||
                      sdo.command == SdoCommand::kDownloadResponse;
@@ -73,8 +75,7 @@ uint8_t CommandByte(const Sdo& sdo) {
 /// Bytes after the CoE header.
 size_t SdoBytes(const Sdo& sdo) {
   if (IsSegment(sdo.command)) return std::max(kInitiate, 1 + sdo.data.size());
-  if (Initiates(sdo.command) && sdo.size == 0) return kInitiate + sdo.data.size();
-  return kInitiate;
+  return kInitiate + (Initiates(sdo.command) && !sdo.expedited ? sdo.data.size() : 0);
 }
 
 void PutHeaders(CoeService service, uint16_t address, uint8_t counter, size_t bytes,
@@ -104,21 +105,20 @@ Sdo DecodeSdo(std::span<const uint8_t> bytes, CoeService service) {
     return sdo;
   }
   sdo.object = {.index = Get<uint16_t>(bytes, 1), .subindex = bytes[3]};
-  sdo.value = Get<uint32_t>(bytes, 4);
   if (sdo.command == SdoCommand::kAbort) {
-    sdo.size = 4;
+    sdo.abort_code = Get<uint32_t>(bytes, 4);
     return sdo;
   }
   sdo.complete = (command & kCompleteBit) != 0;
   if (!Initiates(sdo.command)) return sdo;
-  if ((command & kExpeditedBit) == 0) {
-    sdo.total = sdo.value;
-    sdo.value = 0;
+  sdo.expedited = (command & kExpeditedBit) != 0;
+  if (sdo.expedited) {
+    sdo.total = (command & kSizeBit) != 0 ? 4U - (command >> 2 & 3) : 4U;
+    sdo.data = bytes.subspan(4, sdo.total);
+  } else {
+    sdo.total = Get<uint32_t>(bytes, 4);
     sdo.data = bytes.subspan(kInitiate);
-    return sdo;
   }
-  sdo.size = static_cast<uint8_t>((command & kSizeBit) != 0 ? 4 - ((command >> 2) & 3) : 4);
-  if (sdo.size < 4) sdo.value &= (1U << (8 * sdo.size)) - 1;
   return sdo;
 }
 
@@ -174,12 +174,10 @@ void EncodeSdo(const Sdo& sdo, uint16_t address, uint8_t counter, std::span<uint
   Put<uint16_t>(bytes, 1, sdo.object.index);
   bytes[3] = sdo.object.subindex;
   if (sdo.command == SdoCommand::kAbort) {
-    Put<uint32_t>(bytes, 4, sdo.value);
-  } else if (Initiates(sdo.command) && sdo.size == 0) {
-    Put<uint32_t>(bytes, 4, sdo.total);
-    std::copy(sdo.data.begin(), sdo.data.end(), bytes.begin() + kInitiate);
+    Put<uint32_t>(bytes, 4, sdo.abort_code);
   } else if (Initiates(sdo.command)) {
-    PutSized(bytes, 4, sdo.value, sdo.size);
+    if (!sdo.expedited) Put<uint32_t>(bytes, 4, sdo.total);
+    std::ranges::copy(sdo.data, bytes.subspan(sdo.expedited ? 4 : kInitiate).begin());
   }
 }
 

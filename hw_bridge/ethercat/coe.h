@@ -82,11 +82,11 @@ struct Sdo {
   SdoCommand command = SdoCommand::kOther;
   ObjectAddress object = {};  ///< not of segments
   bool complete = false;      ///< complete access: the whole object, from this subindex (0 or 1)
-  uint32_t value = 0;         ///< expedited: data of `size` bytes; or the abort code
-  uint8_t size = 0;           ///< of expedited data, 1 to 4; 0: `data` holds what there is
-  uint32_t total = 0;         ///< of a normal transfer: bytes of the whole object
+  uint32_t abort_code = 0;
+  bool expedited = false;              ///< `data`, 1 to 4 bytes, are the whole object
+  uint32_t total = 0;                  ///< bytes of the whole object, of which `data` are the first
   bool toggle = false, last = false;   ///< of segments
-  std::span<const uint8_t> data = {};  ///< of a normal transfer's first part, or of a segment
+  std::span<const uint8_t> data = {};  ///< of the transfer's first message, or of a segment
 };
 
 /// Bytes of the mailbox message that carries it, header included; those of an expedited one at

@@ -315,15 +315,9 @@ std::vector<uint8_t> SlaveAccess::UploadBytes(ObjectAddress object, bool complet
       fmt::format("reading {}{}", ethercat::Text(object), complete ? " with complete access" : "");
   const Sdo first = Exchange(
       {.command = SdoCommand::kUploadRequest, .object = object, .complete = complete}, what);
-  std::vector<uint8_t> bytes;
-  if (first.size > 0) {
-    bytes.resize(first.size);
-    PutSized(bytes, 0, first.value, first.size);
-    return bytes;
-  }
   const size_t total = first.total;
   if (total > kMostObject) Fail("{}: it announces {} bytes", what, total);
-  bytes.assign(first.data.begin(), first.data.end());
+  std::vector<uint8_t> bytes(first.data.begin(), first.data.end());
   bool toggle = false, last = false;
   while (bytes.size() < total && !last) {
     const Sdo part = Exchange(
@@ -350,18 +344,16 @@ void SlaveAccess::DownloadBytes(ObjectAddress object, std::span<const uint8_t> d
                                 bool complete) {
   const std::string what =
       fmt::format("writing {}{}", ethercat::Text(object), complete ? " with complete access" : "");
-  Sdo request{.command = SdoCommand::kDownloadRequest, .object = object, .complete = complete};
-  if (data.size() <= kExpedited) {
-    request.size = static_cast<uint8_t>(data.size());
-    request.value = static_cast<uint32_t>(GetSized(data, 0, data.size()));
-    static_cast<void>(Exchange(request, what));
-    return;
-  }
+  const bool expedited = data.size() <= kExpedited;
   const size_t room = out_.size > kSdoMessage ? out_.size - kSdoMessage : 0U;
-  size_t done = std::min(data.size(), room);
-  request.total = static_cast<uint32_t>(data.size());
-  request.data = data.first(done);
-  static_cast<void>(Exchange(request, what));
+  size_t done = expedited ? data.size() : std::min(data.size(), room);
+  static_cast<void>(Exchange({.command = SdoCommand::kDownloadRequest,
+                              .object = object,
+                              .complete = complete,
+                              .expedited = expedited,
+                              .total = static_cast<uint32_t>(data.size()),
+                              .data = data.first(done)},
+                             what));
   for (bool toggle = false; done < data.size(); toggle = !toggle) {
     const size_t part = std::min(data.size() - done, out_.size - kSegmentHeader);
     const Sdo answer = Exchange({.command = SdoCommand::kDownloadSegmentRequest,
@@ -392,8 +384,8 @@ Sdo SlaveAccess::Exchange(const Sdo& request, const std::string& what) {
     const bool ours = IsSegmentRequest(request.command) || sdo.object == request.object;
     if (ours && sdo.command == SdoCommand::kAbort) {
       throw SdoAbortError(fmt::format("{}: {}: SDO abort 0x{:08X} ({})", Describe(), what,
-                                      sdo.value, SdoAbortText(sdo.value)),
-                          sdo.value);
+                                      sdo.abort_code, SdoAbortText(sdo.abort_code)),
+                          sdo.abort_code);
     }
     if (ours && sdo.command == ResponseTo(request.command)) return sdo;
   }

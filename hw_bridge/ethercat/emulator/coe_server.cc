@@ -33,10 +33,8 @@ void CoeServer::Answer(const Sdo& sdo) {
 
 void CoeServer::Abort(ObjectAddress object, SdoAbort code) {
   transfer_ = Transfer::kNone;
-  Answer({.command = SdoCommand::kAbort,
-          .object = object,
-          .value = static_cast<uint32_t>(code),
-          .size = 4});
+  Answer(
+      {.command = SdoCommand::kAbort, .object = object, .abort_code = static_cast<uint32_t>(code)});
 }
 
 std::optional<MailboxError> CoeServer::Handle(std::span<const uint8_t> payload) {
@@ -84,17 +82,14 @@ void CoeServer::BeginUpload(const Sdo& sdo) {
     abort = objects_->ReadComplete(sdo.object, &data_);
   }
   if (abort != SdoAbort::kNone) return Abort(sdo.object, abort);
-  Sdo answer{
-      .command = SdoCommand::kUploadResponse, .object = sdo.object, .complete = sdo.complete};
-  if (data_.size() <= kExpedited && !data_.empty()) {
-    answer.size = static_cast<uint8_t>(data_.size());
-    answer.value = static_cast<uint32_t>(GetSized(data_, 0, data_.size()));
-    return Answer(answer);
-  }
-  done_ = std::min(data_.size(), mailbox_ - kSdoMessage);
-  answer.total = static_cast<uint32_t>(data_.size());
-  answer.data = std::span(data_).first(done_);
-  Answer(answer);
+  const bool expedited = data_.size() <= kExpedited && !data_.empty();
+  done_ = expedited ? data_.size() : std::min(data_.size(), mailbox_ - kSdoMessage);
+  Answer({.command = SdoCommand::kUploadResponse,
+          .object = sdo.object,
+          .complete = sdo.complete,
+          .expedited = expedited,
+          .total = static_cast<uint32_t>(data_.size()),
+          .data = std::span(data_).first(done_)});
   if (done_ == data_.size()) return;
   transfer_ = Transfer::kUpload;
   object_ = sdo.object;
@@ -124,17 +119,14 @@ void CoeServer::BeginDownload(const Sdo& sdo) {
   object_ = sdo.object;
   complete_ = sdo.complete;
   if (complete_ && !complete_access_) return Abort(object_, SdoAbort::kUnsupportedAccess);
-  if (sdo.size == 0 && sdo.total > kMostObject) return Abort(object_, SdoAbort::kLengthTooHigh);
-  if (sdo.size == 0 && sdo.data.size() < sdo.total) {
+  if (sdo.total > kMostObject) return Abort(object_, SdoAbort::kLengthTooHigh);
+  if (sdo.data.size() < sdo.total) {
     transfer_ = Transfer::kDownload;
     data_.assign(sdo.data.begin(), sdo.data.end());
     total_ = sdo.total;
     toggle_ = false;
   } else {
-    std::array<uint8_t, kExpedited> expedited{};
-    PutSized(expedited, 0, sdo.value, kExpedited);
-    const SdoAbort abort = Store(sdo.size > 0 ? std::span<const uint8_t>(expedited).first(sdo.size)
-                                              : sdo.data.first(sdo.total));
+    const SdoAbort abort = Store(sdo.data.first(sdo.total));
     if (abort != SdoAbort::kNone) return Abort(object_, abort);
   }
   Answer({.command = SdoCommand::kDownloadResponse, .object = object_, .complete = complete_});

@@ -182,7 +182,8 @@ TEST_F(EthercatChain, MailboxTakesOneMessageAtATimeAndKeepsItsAnswer) {
   ASSERT_EQ(answer.working_counter, 1);
   const Sdo sdo = DecodeCoe(DecodeMailbox(answer.data)->payload)->sdo;
   EXPECT_EQ(sdo.command, SdoCommand::kUploadResponse);
-  EXPECT_EQ(sdo.value, 1500U);
+  EXPECT_TRUE(sdo.expedited);
+  EXPECT_EQ(GetSized(sdo.data, 0, sdo.data.size()), 1500U);
   EXPECT_EQ(Read(Command::kFprd, 1001, 0x1080, 128).working_counter, 0);  // read once
 
   // The same counter again is the same message: no second answer.

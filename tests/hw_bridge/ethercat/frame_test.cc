@@ -113,14 +113,14 @@ TEST(EthercatMailbox, ReadsWhatAnotherMastersSlaveAnswered) {
   EXPECT_EQ(coe->service, CoeService::kSdoResponse);
   EXPECT_EQ(coe->sdo.command, SdoCommand::kUploadResponse);
   EXPECT_EQ(coe->sdo.object, (ObjectAddress{0xF980, 1}));
-  EXPECT_EQ(coe->sdo.size, 2);
-  EXPECT_EQ(coe->sdo.value, 1U);
+  EXPECT_TRUE(coe->sdo.expedited);
+  EXPECT_THAT(coe->sdo.data, ElementsAreArray({0x01, 0x00}));
 
   const Bytes four_bytes = {0x0a, 0x00, 0xe9, 0x03, 0x00, 0x13, 0x00, 0x30,
                             0x43, 0x80, 0xf9, 0x02, 0xea, 0x82, 0x1e, 0x00};
   const Sdo sdo = DecodeCoe(DecodeMailbox(four_bytes)->payload)->sdo;
-  EXPECT_EQ(sdo.size, 4);
-  EXPECT_EQ(sdo.value, 0x001E82EAU);
+  EXPECT_TRUE(sdo.expedited);
+  EXPECT_THAT(sdo.data, ElementsAreArray({0xEA, 0x82, 0x1E, 0x00}));
 
   // A normal transfer: 240 bytes of an object of 2,048, the rest in segments.
   Bytes normal = {0xfa, 0x00, 0xe9, 0x03, 0x00, 0x33, 0x00, 0x30,
@@ -128,7 +128,7 @@ TEST(EthercatMailbox, ReadsWhatAnotherMastersSlaveAnswered) {
   normal.resize(256, 0);
   const Sdo first = DecodeCoe(DecodeMailbox(normal)->payload)->sdo;
   EXPECT_EQ(first.command, SdoCommand::kUploadResponse);
-  EXPECT_EQ(first.size, 0);
+  EXPECT_FALSE(first.expedited);
   EXPECT_EQ(first.total, 2048U);
   EXPECT_EQ(first.data.size(), 240U);
 }
@@ -136,7 +136,12 @@ TEST(EthercatMailbox, ReadsWhatAnotherMastersSlaveAnswered) {
 TEST(EthercatMailbox, WritesSdosAsCanopenLaysThemOut) {
   Bytes mailbox(kSdoMessage + 2, 0xEE);
   // CiA 301: 23h is an expedited download of 4 bytes, 2Fh of one; 40h an upload, 80h an abort.
-  EncodeSdo({.command = SdoCommand::kDownloadRequest, .object = {0x1C12, 0}, .value = 1, .size = 1},
+  const Bytes one = {1};
+  EncodeSdo({.command = SdoCommand::kDownloadRequest,
+             .object = {0x1C12, 0},
+             .expedited = true,
+             .total = 1,
+             .data = one},
             0, 3, mailbox);
   EXPECT_THAT(mailbox, ElementsAreArray({0x0a, 0x00, 0x00, 0x00, 0x00, 0x33, 0x00, 0x20, 0x2f, 0x12,
                                          0x1c, 0x00, 0x01, 0x00, 0x00, 0x00, 0x00, 0x00}));
@@ -144,8 +149,8 @@ TEST(EthercatMailbox, WritesSdosAsCanopenLaysThemOut) {
   EXPECT_THAT(mailbox, ElementsAreArray({0x0a, 0x00, 0xe9, 0x03, 0x00, 0x03, 0x00, 0x20, 0x40, 0x80,
                                          0xf9, 0x02, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00}));
   // An abort is an SDO request (service 2), whoever sends it (ETG.1000.6, abort SDO transfer).
-  EncodeSdo({.command = SdoCommand::kAbort, .object = {0x6076, 0}, .value = 0x06010002, .size = 4},
-            0, 7, mailbox);
+  EncodeSdo({.command = SdoCommand::kAbort, .object = {0x6076, 0}, .abort_code = 0x06010002}, 0, 7,
+            mailbox);
   EXPECT_THAT(mailbox, ElementsAreArray({0x0a, 0x00, 0x00, 0x00, 0x00, 0x73, 0x00, 0x20, 0x80, 0x76,
                                          0x60, 0x00, 0x02, 0x00, 0x01, 0x06, 0x00, 0x00}));
 }

@@ -234,12 +234,14 @@ Bytes HostileMailbox(Random& random) {
                    .data = data},
                   static_cast<uint8_t>(random() % 8), message);
   } else {
+    const bool expedited = random() % 5 != 0;
+    if (expedited) data.resize(1 + random() % kExpedited);
     const Sdo sdo{.command = kCommands[Below(std::size(kCommands), random)],
                   .object = {kIndices[Below(std::size(kIndices), random)],
                              static_cast<uint8_t>(random() % 5)},
                   .complete = random() % 3 == 0,
-                  .value = static_cast<uint32_t>(random()),
-                  .size = static_cast<uint8_t>(random() % 5),
+                  .abort_code = static_cast<uint32_t>(random()),
+                  .expedited = expedited,
                   .total = static_cast<uint32_t>(random() % 8 == 0 ? random() : random() % 600),
                   .toggle = random() % 2 == 0,
                   .last = random() % 2 == 0,
