@@ -69,12 +69,12 @@ bool IsSet(const google::protobuf::Message& group, const std::string& setting) {
 
 }  // namespace
 
-void HwBridge::MakeBus(const HwBridgeConfig& config, double period) {
-  const google::protobuf::Reflection& reflection = *config.GetReflection();
+void HwBridge::MakeBus(double period) {
+  const google::protobuf::Reflection& reflection = *config_.GetReflection();
   const DriveBusType* asked = nullptr;
   for (const DriveBusType& type : buses_) {
     const auto* const field = FindField(*HwBridgeConfig::descriptor(), type.name);
-    if (field == nullptr || !reflection.HasField(config, field)) continue;
+    if (field == nullptr || !reflection.HasField(config_, field)) continue;
     if (asked != nullptr) {
       throw ConfigError(type.name,
                         fmt::format("must be left out with {}: a robot has one bus", asked->name));
@@ -86,7 +86,7 @@ void HwBridge::MakeBus(const HwBridgeConfig& config, double period) {
     return;
   }
   const google::protobuf::Message& group =
-      reflection.GetMessage(config, FindField(*HwBridgeConfig::descriptor(), asked->name));
+      reflection.GetMessage(config_, FindField(*HwBridgeConfig::descriptor(), asked->name));
   try {
     own_bus_ = asked->make(group, *model_, period);
   } catch (const ConfigError& error) {
@@ -100,22 +100,20 @@ void HwBridge::MakeBus(const HwBridgeConfig& config, double period) {
 }
 
 void HwBridge::Configure(const ComponentContext& context, Wiring* wiring) {
-  const auto config = context.config<HwBridgeConfig>();
-  if (config.command_deadline() < config.sense_deadline()) {
+  config_ = context.config<HwBridgeConfig>();
+  if (config_.command_deadline() < config_.sense_deadline()) {
     throw ConfigError("command_deadline", "must be sense_deadline or more");
   }
   model_ = LoadRobot(context);
-  SupervisorConfig supervisor = MakeSupervisorConfig(config, *model_, context.tick_period);
-  MakeBus(config, context.tick_period);
+  SupervisorConfig supervisor = MakeSupervisorConfig(config_, *model_, context.tick_period);
+  MakeBus(context.tick_period);
   supervisor.drive_impedance = (own_bus_ ? *own_bus_ : simulated_bus_).impedance();
   supervisor_ = std::make_unique<Supervisor>(supervisor);
-  enable_at_start_ = config.enable_at_start();
-  enable_cycles_ = config.enable_cycles();
-  AddPorts(config, wiring);
+  AddPorts(wiring);
   MessageTraits<drive_feedback_t>::Resize(feedback_, JointAndFootCounts(*model_));
 }
 
-void HwBridge::AddPorts(const HwBridgeConfig& config, Wiring* wiring) {
+void HwBridge::AddPorts(Wiring* wiring) {
   const int n = model_->num_joints();
   const MessageCounts counts = JointAndFootCounts(*model_);
   std::vector<InputPort*> senses;
@@ -135,17 +133,17 @@ void HwBridge::AddPorts(const HwBridgeConfig& config, Wiring* wiring) {
   }
   wiring->AddStage(
       "sense", std::move(senses), {&robot_sensors_}, [this](const Tick& tick) { Sense(tick); },
-      config.sense_deadline());
+      config_.sense_deadline());
   wiring->AddStage(
       "actuate", {&joint_command_, &emergency_stop_}, std::move(acts),
-      [this](const Tick& tick) { Actuate(tick); }, config.command_deadline());
+      [this](const Tick& tick) { Actuate(tick); }, config_.command_deadline());
 }
 
 void HwBridge::Open() {
   if (own_bus_) bus_ = own_bus_.get();
   try {
     bus_->Start();
-    if (own_bus_ && enable_at_start_) EnableDrives();
+    if (own_bus_ && config_.enable_at_start()) EnableDrives();
   } catch (...) {
     bus_->Stop();  // what went wrong is said already
     throw;
@@ -163,12 +161,12 @@ void HwBridge::EnableDrives() {
   };
   const auto num_joints = static_cast<size_t>(model_->num_joints());
   for (int cycle = 0; waiting() < num_joints; ++cycle) {
-    if (cycle > enable_cycles_) {
+    if (cycle > config_.enable_cycles()) {
       throw std::runtime_error(
           fmt::format("the drive of joint \"{}\" is not enabled after {} cycles; is it powered, "
                       "without a fault "
                       "and safe torque off?",
-                      model_->joints()[waiting()].name, enable_cycles_));
+                      model_->joints()[waiting()].name, config_.enable_cycles()));
     }
     bus_->Idle(true);
     bus_->AwaitNextCycle();
@@ -178,7 +176,7 @@ void HwBridge::EnableDrives() {
 void HwBridge::Idle() {
   if (!open_) return;
   if (last_cycle_ < 0) {
-    bus_->Idle(enable_at_start_);
+    bus_->Idle(config_.enable_at_start());
   } else if (!simulated_time_) {  // which stands still now, and the last tick is still at work
     supervisor_->Shutdown();
     RunDown();

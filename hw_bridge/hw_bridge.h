@@ -42,8 +42,8 @@ class HwBridge : public Component {
 
  private:
   /// The bus that the configuration asks for.
-  void MakeBus(const HwBridgeConfig& config, double period);
-  void AddPorts(const HwBridgeConfig& config, Wiring* wiring);
+  void MakeBus(double period);
+  void AddPorts(Wiring* wiring);
   void Sense(const Tick& tick);
   void ReadFootSensors(const drive_feedback_t& feedback);
   void Actuate(const Tick& tick);
@@ -71,9 +71,9 @@ class HwBridge : public Component {
   DriveBus* bus_ = nullptr;  // one of the two; the own one from Open on
   std::unique_ptr<Supervisor> supervisor_;
   drive_feedback_t feedback_;
-  bool simulated_time_ = true, enable_at_start_ = false, open_ = false;
-  bool all_sensors_ = false;  // are the own bus's
-  int enable_cycles_ = 0;
+  HwBridgeConfig config_;
+  bool simulated_time_ = true, open_ = false;
+  bool all_sensors_ = false;   // are the own bus's
   bool reset_before_ = false;  // of the operator's message
   int64_t last_cycle_ = -1;
 };

@@ -65,20 +65,18 @@ void DriveEmulator::Shaft::SetCounts(int64_t counts, double seconds) {
 }
 
 void DriveEmulator::Configure(const ComponentContext& context, Wiring* wiring) {
-  const auto config = context.config<DriveEmulatorConfig>();
+  config_ = context.config<DriveEmulatorConfig>();
   const std::shared_ptr<const robot::RobotModel> model = LoadRobot(context);
-  link_config_ = config.link();
-  ethercat::CheckLink(link_config_);
-  simulated_time_ = config.simulated_time();
+  ethercat::CheckLink(config_.link());
   period_seconds_ = context.tick_period;
   period_ = std::llround(context.tick_period * 1e9);
 
-  auto drives = config.wiring();
+  auto drives = config_.wiring();
   if (drives.empty()) {
     for (const robot::Joint& joint : model->joints()) drives.Add()->set_joint(joint.name);
   }
   ethercat::EmulatedChainConfig chain;
-  chain.set_hop(config.hop());
+  chain.set_hop(config_.hop());
   std::vector<ethercat::MotorLoad*> loads;
   for (int i = 0; i < drives.size(); ++i) {
     const size_t joint = FindJoint(*model, drives[i].joint(), fmt::format("wiring[{}].joint", i));
@@ -88,9 +86,9 @@ void DriveEmulator::Configure(const ComponentContext& context, Wiring* wiring) {
     joint_.push_back(joint);
     const robot::MotorModel& motor = model->motors()[joint];
     ethercat::EmulatedDriveConfig& drive = *chain.add_drive();
-    drive = config.drive();
+    drive = config_.drive();
     drive.set_serial(static_cast<uint32_t>(i + 1));
-    for (const DriveChange& change : config.change()) {
+    for (const DriveChange& change : config_.change()) {
       if (change.joint() == drives[i].joint()) drive.MergeFrom(change.drive());
     }
     CompleteDrive(motor, &drive);
@@ -98,11 +96,11 @@ void DriveEmulator::Configure(const ComponentContext& context, Wiring* wiring) {
         std::make_unique<Shaft>(motor, drives[i].reversed(), drives[i].zero_counts()));
     loads.push_back(shafts_.back().get());
   }
-  for (int i = 0; i < config.change_size(); ++i) {
-    FindJoint(*model, config.change(i).joint(), fmt::format("change[{}].joint", i));
+  for (int i = 0; i < config_.change_size(); ++i) {
+    FindJoint(*model, config_.change(i).joint(), fmt::format("change[{}].joint", i));
   }
-  for (int i = 0; i < config.trouble_size(); ++i) {
-    const DriveTrouble& trouble = config.trouble(i);
+  for (int i = 0; i < config_.trouble_size(); ++i) {
+    const DriveTrouble& trouble = config_.trouble(i);
     Trouble& entry = troubles_.emplace_back();
     entry.config = trouble;
     if (trouble.kind() == DriveTrouble::FRAMES) continue;
@@ -129,7 +127,7 @@ void DriveEmulator::Configure(const ComponentContext& context, Wiring* wiring) {
 }
 
 void DriveEmulator::Open() {
-  socket_ = ethercat::OpenLink(link_config_, ethercat::SocketLink::Side::kSlaves);
+  socket_ = ethercat::OpenLink(config_.link(), ethercat::SocketLink::Side::kSlaves);
   clock_offset_ = -socket_->Now();
 }
 
@@ -168,7 +166,7 @@ std::string DriveEmulator::Close() {
 int64_t DriveEmulator::Now() {
   if (ticking_) return tick_time_;
   int64_t now = socket_->Now() + clock_offset_;
-  if (simulated_time_ && now > last_frame_ + kPatience) {
+  if (config_.simulated_time() && now > last_frame_ + kPatience) {
     clock_offset_ -= now - (last_frame_ + kPatience);
     now = last_frame_ + kPatience;
   }
@@ -268,7 +266,7 @@ void DriveEmulator::Sense(const Tick& tick) {
   } else {
     sensor_feedback_.Withhold();
   }
-  if (simulated_time_ && socket_) {
+  if (config_.simulated_time() && socket_) {
     Serve();
     if (!ticking_) StartSimulatedTime();
     tick_time_ = first_tick_time_ + tick.index * period_;

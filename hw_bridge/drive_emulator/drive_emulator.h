@@ -85,7 +85,7 @@ class DriveEmulator final : public Component, private Device {
   Output<drive_feedback_t> sensor_feedback_;
   Output<drive_command_t> drive_command_;
 
-  ethercat::LinkConfig link_config_;
+  DriveEmulatorConfig config_;
   std::unique_ptr<ethercat::SocketLink> socket_;
   std::vector<std::unique_ptr<Shaft>> shafts_;  // by place in the chain
   std::vector<size_t> joint_;                   // of each place
@@ -95,7 +95,6 @@ class DriveEmulator final : public Component, private Device {
   std::vector<Trouble> troubles_;
   std::array<uint8_t, ethercat::kMaxFrame> frame_{};
 
-  bool simulated_time_ = false;
   int64_t period_ = 0;  // ns
   double period_seconds_ = 0;
   int64_t clock_offset_ = 0;     // ns, the drives' time less the socket's clock

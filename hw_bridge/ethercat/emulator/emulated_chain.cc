@@ -43,7 +43,6 @@ EmulatedChain::EmulatedChain(const EmulatedChainConfig& config, std::span<MotorL
       loads_(loads.begin(), loads.end()),
       behind_(static_cast<size_t>(config.drive_size()), {-1, -1, -1, -1}),
       port_times_(behind_.size()),
-      hop_(config.hop()),
       connected_(behind_.size()) {
   for (size_t i = 0; i < behind_.size(); ++i) {
     slaves_.push_back(MakeSlave(i));
@@ -80,7 +79,7 @@ int64_t EmulatedChain::Walk(size_t slave, int64_t arrival) {
     const auto port = static_cast<size_t>(kFrameOrder[(entry + i) % kNumPorts]);
     const int next = behind_[slave][port];
     if (next >= 0 && static_cast<size_t>(next) < connected_) {
-      time = Walk(static_cast<size_t>(next), time + hop_) + hop_;
+      time = Walk(static_cast<size_t>(next), time + config_.hop()) + config_.hop();
       times[port] = time;
     }
     // The processing unit is behind port 0.
@@ -148,7 +147,7 @@ bool EmulatedChain::HandleFrame(std::span<uint8_t> frame, int64_t now) {
       LatchReceiveTimes(now);
     }
   }
-  const auto turn = static_cast<int64_t>(slaves_.size()) * hop_;
+  const auto turn = static_cast<int64_t>(slaves_.size()) * config_.hop();
   AdvanceTo(now + turn);
   return true;
 }

@@ -61,7 +61,6 @@ class EmulatedChain final : public FrameHandler {
   std::vector<std::array<std::optional<int64_t>, kNumPorts>> port_times_;  // ns after the start
   int64_t now_ = 0;
   std::vector<std::unique_ptr<EmulatedSlave>> slaves_;
-  int64_t hop_;
   size_t connected_;
   int64_t frames_ = 0, refused_ = 0;
 };
