@@ -426,6 +426,11 @@ CycleResult Master::Receive(int64_t deadline) {
   return result;
 }
 
+bool Master::Answers(const Datagram& datagram, Command command, uint16_t ado, size_t size) const {
+  return datagram.index == cyclic_index_ && datagram.command == command && datagram.ado == ado &&
+         datagram.data.size() == size;
+}
+
 bool Master::Take(const FrameReader& frame, CycleResult* result) {
   FrameReader reader = frame;
   const int expected = 2 + (clocks_.running ? 1 : 0) + (acyclic_ ? 1 : 0);
@@ -437,10 +442,8 @@ bool Master::Take(const FrameReader& frame, CycleResult* result) {
   const size_t outputs = image_.outputs_size();
   if (data.index != cyclic_index_ || data.command != cyclic.command ||
       data.logical_address() != cyclic.address() || data.data.size() != cyclic.size ||
-      status.index != cyclic_index_ || status.command != Command::kBrd ||
-      status.ado != reg::kAlStatus || status.data.size() != 2 ||
-      (clock && (clock->index != cyclic_index_ || clock->command != Command::kFrmw ||
-                 clock->ado != reg::kDcSystemTime || clock->data.size() != 8))) {
+      !Answers(status, Command::kBrd, reg::kAlStatus, 2) ||
+      (clock && !Answers(*clock, Command::kFrmw, reg::kDcSystemTime, 8))) {
     return false;
   }
   // Outputs come back as they went, or the frame was damaged where no checksum looked.
@@ -449,7 +452,12 @@ bool Master::Take(const FrameReader& frame, CycleResult* result) {
                   image_bytes_.begin())) {
     return false;
   }
-  if (acyclic_ && !TakeAcyclic(&reader)) return false;
+  if (acyclic_) {
+    const Datagram datagram = *reader.Next();
+    if (!Answers(datagram, acyclic_->command, acyclic_->ado, acyclic_->data.size())) return false;
+    attendant_->slot().Answer(datagram);
+    acyclic_.reset();
+  }
   result->returned = true;
   result->working_counter = data.working_counter;
   result->complete = data.working_counter == result->expected_working_counter;
@@ -471,17 +479,6 @@ bool Master::Take(const FrameReader& frame, CycleResult* result) {
   }
   trouble_ = result->al_status != static_cast<uint8_t>(AlState::kOp) ||
              result->slaves_answering != num_slaves() || !result->complete;
-  return true;
-}
-
-bool Master::TakeAcyclic(FrameReader* reader) {
-  const Datagram datagram = *reader->Next();
-  if (datagram.index != cyclic_index_ || datagram.command != acyclic_->command ||
-      datagram.ado != acyclic_->ado || datagram.data.size() != acyclic_->data.size()) {
-    return false;
-  }
-  attendant_->slot().Answer(datagram);
-  acyclic_.reset();
   return true;
 }
 

@@ -99,7 +99,8 @@ class Master {
   /// Exchanges process data at the next cycle's time.
   CycleResult Pace();
   bool Take(const FrameReader& reader, CycleResult* result);
-  bool TakeAcyclic(FrameReader* reader);
+  /// Whether it is the last frame's datagram of this command, register and size.
+  bool Answers(const Datagram& datagram, Command command, uint16_t ado, size_t size) const;
   /// The cyclic datagram: which part of the image, and the working counter when all take part.
   struct Cyclic {
     Command command;
