@@ -171,8 +171,6 @@ bool Supervisor::MayStart() {
   return true;
 }
 
-bool Supervisor::TakeReset() { return std::exchange(reset_, false); }
-
 void Supervisor::Reset(const joint_command_t* command) {
   if (!std::exchange(reset_requested_, false) || !at_rest()) return;
   const auto none = [](const std::vector<double>& values) {

@@ -5,6 +5,7 @@
 #include <bitset>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "hw_bridge/command_gate.h"
@@ -64,7 +65,7 @@ class Supervisor {
   /// Then INIT. True in the cycle in which that happened: see TakeReset.
   void RequestReset() { reset_requested_ = true; }
   /// Whether the last Cycle has reset the stop; the drives' faults are to be reset then.
-  bool TakeReset();
+  bool TakeReset() { return std::exchange(reset_, false); }
 
   /// Ends cycle number `cycle` (increasing, ≥ 0). `command`: what arrived in it, nullptr when
   /// nothing did. Fills currents and enables of `drives` and everything but run, tick and time of

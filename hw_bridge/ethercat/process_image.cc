@@ -111,13 +111,6 @@ ProcessImage::ProcessImage(const MasterConfig& config) {
   }
 }
 
-bool ProcessImage::Sends(size_t slave, uint16_t index) const {
-  return slaves_[slave].rx.Find(index) != nullptr;
-}
-bool ProcessImage::Reports(size_t slave, uint16_t index) const {
-  return slaves_[slave].tx.Find(index) != nullptr;
-}
-
 void ProcessImage::Put(size_t slave, const DriveOutputs& outputs, std::span<uint8_t> image) const {
   const std::span<uint8_t> bytes = image.subspan(outputs_at(slave), outputs_of(slave));
   // What else is mapped stays zero.

@@ -75,8 +75,12 @@ class ProcessImage {
   uint16_t expected_write() const { return static_cast<uint16_t>(writes_); }
 
   /// Whether the process data of a slave have an object.
-  bool Sends(size_t slave, uint16_t index) const;
-  bool Reports(size_t slave, uint16_t index) const;
+  bool Sends(size_t slave, uint16_t index) const {
+    return slaves_[slave].rx.Find(index) != nullptr;
+  }
+  bool Reports(size_t slave, uint16_t index) const {
+    return slaves_[slave].tx.Find(index) != nullptr;
+  }
 
   /// Precondition of all: `image` has size() bytes. Objects that are not mapped are left out; a
   /// mode that is not reported is the one that was asked for.

@@ -45,10 +45,6 @@ void SlaveAccess::Transfer(Command command, uint16_t address, std::span<uint8_t>
   }
 }
 
-void SlaveAccess::Read(uint16_t address, std::span<uint8_t> data) {
-  Transfer(Command::kFprd, address, data);
-}
-
 void SlaveAccess::Write(uint16_t address, std::span<const uint8_t> data) {
   std::vector<uint8_t> bytes(data.begin(), data.end());
   Transfer(Command::kFpwr, address, bytes);

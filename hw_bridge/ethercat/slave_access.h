@@ -69,7 +69,7 @@ class SlaveAccess {
   std::string Describe() const;
   uint16_t station() const { return station_; }
 
-  void Read(uint16_t address, std::span<uint8_t> data);
+  void Read(uint16_t address, std::span<uint8_t> data) { Transfer(Command::kFprd, address, data); }
   void Write(uint16_t address, std::span<const uint8_t> data);
   template <class T>
   T Read(uint16_t address) {

@@ -120,10 +120,6 @@ Endpoint::~Endpoint() {
   dds_delete(topic_);
 }
 
-bool Endpoint::WriteSample(const void* sample) {
-  return dds_write(entity_, sample) == DDS_RETCODE_OK;
-}
-
 bool Endpoint::TakeSample(void* sample, int64_t* sent) {
   void* samples[1] = {sample};
   dds_sample_info_t info[1];

@@ -41,7 +41,7 @@ class Endpoint {
   /// Reliable where writing; samples kept: `depth`. Throws UnitreeError.
   Endpoint(const Participant& participant, Kind kind, const dds_topic_descriptor_t& type,
            const char* topic, int32_t depth);
-  bool WriteSample(const void* sample);
+  bool WriteSample(const void* sample) { return dds_write(entity_, sample) == DDS_RETCODE_OK; }
   /// `sent`, unless null: when its writer gave it away, ns since the epoch by the writer's clock.
   bool TakeSample(void* sample, int64_t* sent);
   /// Waits until a sample is there, at most until `deadline` of NowNanoseconds. True: there is one.

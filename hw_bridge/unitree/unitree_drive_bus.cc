@@ -273,8 +273,6 @@ void UnitreeDriveBus::Idle(bool enable) {
   if (!early_) SendMotors(nullptr, enable);
 }
 
-void UnitreeDriveBus::Send(const drive_command_t& command) { SendMotors(&command); }
-
 void UnitreeDriveBus::AwaitNextCycle() {
   const int64_t left = cycle_start_ + period_ - link_->Now();
   if (left > 0) std::this_thread::sleep_for(std::chrono::nanoseconds(left));

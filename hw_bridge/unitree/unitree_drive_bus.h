@@ -38,7 +38,7 @@ class UnitreeDriveBus final : public DriveBus {
   void Idle(bool enable) override;
   void AwaitNextCycle() override;
   const drive_feedback_t* Receive() override;
-  void Send(const drive_command_t& command) override;
+  void Send(const drive_command_t& command) override { SendMotors(&command); }
   bool impedance() const override { return true; }
   /// The robot has an IMU; its feet have no sensors.
   SensorsOfBus sensors() const override { return {.imu = true, .feet = true, .velocity = true}; }

@@ -9,6 +9,7 @@ namespace poise::ethercat {
 namespace {
 
 constexpr size_t kRegisters = 0x1000;
+constexpr int kSyncManagerArea = 5;  // bytes: start, length, control
 
 /// Counters, which a write clears, whatever is written.
 bool IsCounter(size_t address) {
@@ -36,8 +37,8 @@ const std::array<bool, kRegisters>& Writable() {
     std::fill_n(&result[reg::kFmmu], kNumFmmus * kFmmuSize, true);
     for (size_t i = 0; i < kNumSyncManagers; ++i) {
       const size_t base = reg::kSyncManager + i * kSyncManagerSize;
-      std::fill_n(&result[base], 5, true);  // start, length, control
-      result[base + 6] = true;              // activate
+      std::fill_n(&result[base], kSyncManagerArea, true);
+      result[base + 6] = true;  // activate
     }
     return result;
   }();
@@ -182,14 +183,11 @@ bool EmulatedEsc::WriteRegisters(size_t address, std::span<const uint8_t> data) 
   for (size_t i = 0; i < data.size() && address + i < kRegisters; ++i) {
     const size_t at = address + i;
     if (!Writable()[at]) continue;
-    const bool sync_setting = at >= reg::kSyncManager &&
-                              at < reg::kSyncManager + kNumSyncManagers * kSyncManagerSize &&
-                              (at - reg::kSyncManager) % kSyncManagerSize < 5;
     // An active sync manager's area does not move.
-    if (sync_setting &&
-        sync_manager(static_cast<int>((at - reg::kSyncManager) / kSyncManagerSize)).active) {
-      continue;
-    }
+    const int byte = static_cast<int>(at) - reg::kSyncManager, manager = byte / kSyncManagerSize;
+    const bool of_area =
+        byte >= 0 && manager < kNumSyncManagers && byte % kSyncManagerSize < kSyncManagerArea;
+    if (of_area && sync_manager(manager).active) continue;
     any = true;
     // The system time is no memory: a write is a comparison.
     if (at >= reg::kDcReceiveTime && at < reg::kDcOffset) continue;

@@ -54,8 +54,6 @@ size_t SlotLink::Receive(std::span<uint8_t> frame, int64_t deadline) {
   return 0;
 }
 
-void SlotLink::Finish() { Set(kFinished); }
-
 std::optional<Datagram> SlotLink::Take() {
   if (state_.load(std::memory_order_acquire) != kPosted) return std::nullopt;
   state_.store(kUnderWay, std::memory_order_release);

@@ -23,7 +23,7 @@ class SlotLink final : public Link {
   size_t Receive(std::span<uint8_t> frame, int64_t deadline) override;
   bool closed() const { return closed_.load(std::memory_order_acquire); }
   /// The thread's last call: nothing more will be sent.
-  void Finish();
+  void Finish() { Set(kFinished); }
 
   // The cycle's side. None but Settle waits; none allocates.
   /// The datagram that waits to be sent; it stays valid until Answer or Lost.

@@ -13,7 +13,6 @@
 #include <cstring>
 #include <memory>
 
-#include "components/framework/clock.h"
 #include "components/framework/configuration/config_error.h"
 #include "components/framework/configuration/field_rules.h"
 
@@ -34,8 +33,6 @@ sockaddr_in Address(const UdpConfig& config) {
 }
 
 }  // namespace
-
-int64_t SocketLink::Now() const { return NowNanoseconds(); }
 
 bool SocketLink::WaitReadable(int64_t deadline) const {
   while (true) {

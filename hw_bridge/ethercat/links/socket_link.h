@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "components/framework/clock.h"
 #include "components/framework/file_descriptor.h"
 #include "hw_bridge/ethercat/links/frame.h"
 #include "hw_bridge/ethercat/links/link.h"
@@ -19,7 +20,7 @@ class SocketLink : public Link {
  public:
   enum class Side { kMaster, kSlaves };
 
-  int64_t Now() const override;
+  int64_t Now() const override { return NowNanoseconds(); }
   /// Readable when a frame has come.
   int fd() const { return socket_; }
 
