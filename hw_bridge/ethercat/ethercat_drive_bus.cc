@@ -16,10 +16,11 @@
 namespace poise::ethercat {
 namespace {
 
-const EthercatBusConfig& Checked(const EthercatBusConfig& config) {
+EthercatBusConfig Completed(EthercatBusConfig config, const robot::RobotModel& model) {
   if (!config.simulated_time() && int64_t{config.input_wait()} * 1000 >= config.master().cycle()) {
     throw EthercatError("EtherCAT configuration: input_wait must be less than a cycle");
   }
+  *config.mutable_master() = CompleteMasterConfig(config.master(), model);
   return config;
 }
 
@@ -86,18 +87,17 @@ MasterConfig CompleteMasterConfig(MasterConfig config, const robot::RobotModel& 
 EthercatDriveBus::EthercatDriveBus(LinkOpener open_link, const EthercatBusConfig& config,
                                    const robot::RobotModel& model)
     : open_link_(std::move(open_link)),
-      config_(Checked(config)),
-      master_(nullptr, CompleteMasterConfig(config.master(), model)),
+      config_(Completed(config, model)),
+      master_(nullptr, config_.master()),
       steering_(config.master().cycle()),
       judge_(config.most_bad_in_a_row(), config.most_bad_in_100()) {
-  const MasterConfig complete = CompleteMasterConfig(config.master(), model);
+  const auto& drives = config_.master().drive();
   for (int j = 0; j < model.num_joints(); ++j) {
     const robot::MotorModel& motor = model.motors()[static_cast<size_t>(j)];
     const std::string& name = model.joints()[static_cast<size_t>(j)].name;
-    const auto place = std::find_if(complete.drive().begin(), complete.drive().end(),
-                                    [&](const DriveConfig& d) { return d.joint() == name; });
+    const auto place = std::ranges::find(drives, name, &DriveConfig::joint);
     const DriveScale scale(motor, *place);
-    drives_.push_back({.slave = static_cast<size_t>(place - complete.drive().begin()),
+    drives_.push_back({.slave = static_cast<size_t>(place - drives.begin()),
                        .scale = scale,
                        .max_torque = scale.LimitPerMille(motor.peak_current)});
   }
@@ -105,7 +105,7 @@ EthercatDriveBus::EthercatDriveBus(LinkOpener open_link, const EthercatBusConfig
   MessageTraits<drive_feedback_t>::Resize(feedback_, counts);
   MessageTraits<drive_command_t>::Resize(idle_, std::span(counts).first(1));
   reports_.resize(drives_.size());
-  FindReadings(complete, model.feet().size());
+  FindReadings(model.feet().size());
 }
 
 double* EthercatDriveBus::Target(const SensorReading& reading) {
@@ -123,7 +123,8 @@ double* EthercatDriveBus::Target(const SensorReading& reading) {
   return &feedback_.foot_wrench[reading.foot()].moment[axis];
 }
 
-void EthercatDriveBus::FindReadings(const MasterConfig& config, size_t num_feet) {
+void EthercatDriveBus::FindReadings(size_t num_feet) {
+  const MasterConfig& config = config_.master();
   for (int i = 0; i < config.other_size(); ++i) {
     const auto slave = static_cast<size_t>(config.drive_size() + i);
     for (const SensorReading& reading : config.other(i).reading()) {
@@ -338,12 +339,10 @@ void EthercatDriveBus::RequestFaultReset() {
   judge_.Reset(&health_);
 }
 
-DriveBusType EthercatBusType() {
-  return EthercatBusType(
-      [](const LinkConfig& config) { return OpenLink(config, SocketLink::Side::kMaster); });
-}
-
 DriveBusType EthercatBusType(LinkOpener open_link) {
+  if (!open_link) {
+    open_link = [](const LinkConfig& link) { return OpenLink(link, SocketLink::Side::kMaster); };
+  }
   const auto make = [open_link = std::move(open_link)](
                         EthercatBusConfig config, const robot::RobotModel& model, double period) {
     const auto cycle = static_cast<uint32_t>(std::llround(period * 1e9));

@@ -76,7 +76,7 @@ class EthercatDriveBus final : public DriveBus {
     SensorReading config;
   };
 
-  void FindReadings(const MasterConfig& config, size_t num_feet);
+  void FindReadings(size_t num_feet);
   double* Target(const SensorReading& reading);
   /// Takes what has come of the last frame; the result of the exchange that has inputs.
   CycleResult ReceiveFrames();
@@ -105,9 +105,7 @@ class EthercatDriveBus final : public DriveBus {
   int64_t cycle_start_ = 0, cycle_correction_ = 0;
 };
 
-/// hw_bridge.ethercat, on sockets.
-DriveBusType EthercatBusType();
-/// Opens its link by `open_link`, in place of a socket's.
-DriveBusType EthercatBusType(LinkOpener open_link);
+/// hw_bridge.ethercat, on sockets unless another opener is given.
+DriveBusType EthercatBusType(LinkOpener open_link = nullptr);
 
 }  // namespace poise::ethercat

@@ -295,11 +295,10 @@ void UnitreeDriveBus::Diagnose(bus_status_t* status) const {
   }
 }
 
-DriveBusType UnitreeBusType() {
-  return UnitreeBusType([](const DdsLink& link) { return std::make_unique<DdsRobotLink>(link); });
-}
-
 DriveBusType UnitreeBusType(RobotLinkOpener open_link) {
+  if (!open_link) {
+    open_link = [](const DdsLink& link) { return std::make_unique<DdsRobotLink>(link); };
+  }
   const auto make = [open_link = std::move(open_link)](const UnitreeBusConfig& config,
                                                        const robot::RobotModel& model,
                                                        double period) {

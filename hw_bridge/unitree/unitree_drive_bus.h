@@ -89,9 +89,7 @@ class UnitreeDriveBus final : public DriveBus {
   int64_t cycle_start_ = 0, cycle_correction_ = 0;
 };
 
-/// hw_bridge.unitree, on DDS.
-DriveBusType UnitreeBusType();
-/// Opens its link by `open_link`, in place of DDS.
-DriveBusType UnitreeBusType(RobotLinkOpener open_link);
+/// hw_bridge.unitree, on DDS unless another opener is given.
+DriveBusType UnitreeBusType(RobotLinkOpener open_link = nullptr);
 
 }  // namespace poise::unitree

@@ -26,9 +26,8 @@ EmulatedRobot::EmulatedRobot(const UnitreeEmulatorConfig& config, const robot::R
     : config_(config),
       motors_(model.motors()),
       slots_(MotorSlots(model, config.layout(), config.slot())),
-      watchdog_cycles_(0) {
+      watchdog_cycles_(std::llround(config.watchdog() / period)) {
   CheckFields(config);
-  watchdog_cycles_ = std::llround(config.watchdog() / period);
   for (int i = 0; i < config.trouble_size(); ++i) {
     Trouble& trouble = troubles_.emplace_back();
     trouble.config = config.trouble(i);
