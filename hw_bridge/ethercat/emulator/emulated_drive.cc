@@ -82,7 +82,7 @@ EmulatedDrive::EmulatedDrive(const EmulatedDriveConfig& config, ObjectDictionary
 }
 
 bool EmulatedDrive::Lacks(uint16_t index) const {
-  return std::ranges::find(config_.lacks(), index) != config_.lacks().end();
+  return config_.other() || std::ranges::find(config_.lacks(), index) != config_.lacks().end();
 }
 
 void EmulatedDrive::TriggerFault(uint16_t error) {

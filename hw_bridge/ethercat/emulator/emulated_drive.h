@@ -54,7 +54,7 @@ class EmulatedDrive {
   std::optional<uint16_t> TakeEmergency() { return std::exchange(emergency_, std::nullopt); }
 
  private:
-  bool Lacks(uint16_t index) const;
+  bool Lacks(uint16_t index) const;  // all, in a slave that is no drive
   void UpdateState(bool outputs_valid);
   void Follow(uint16_t controlword, bool reset_edge);
   void Enter(DriveState state);

@@ -103,7 +103,7 @@ SdoAbort InRange(bool good) { return good ? SdoAbort::kNone : SdoAbort::kValueRa
 EmulatedSlave::EmulatedSlave(const EmulatedDriveConfig& config, MotorLoad* load)
     : config_(config),
       esc_(config, MakeEeprom(config)),
-      drive_(config, config.other() ? &unused_ : &objects_, load),
+      drive_(config, &objects_, load),
       coe_(&objects_, kMailboxSize, config.complete_access()) {
   AddCommonObjects();
   const bool own = config_.other() || config_.fixed_rx_size() > 0 || config_.fixed_tx_size() > 0;

@@ -77,7 +77,7 @@ class EmulatedSlave {
   void UpdateInputs();
 
   EmulatedDriveConfig config_;
-  ObjectDictionary objects_, unused_;  // unused: of the drive in a slave that is none
+  ObjectDictionary objects_;
   EmulatedEsc esc_;
   EmulatedDrive drive_;
   CoeServer coe_;
