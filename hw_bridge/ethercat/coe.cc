@@ -20,16 +20,18 @@ struct Coding {
   SdoCommand command;
   CoeService service;
   uint8_t specifier;
+  bool segment = false;  // has a toggle bit, and names no object
+  bool data = false;     // carries the object's data, the beginning of it or a segment
 };
 constexpr Coding kCodings[] = {
-    {SdoCommand::kDownloadSegmentRequest, CoeService::kSdoRequest, 0x00},
-    {SdoCommand::kDownloadRequest, CoeService::kSdoRequest, 0x20},
+    {SdoCommand::kDownloadSegmentRequest, CoeService::kSdoRequest, 0x00, true, true},
+    {SdoCommand::kDownloadRequest, CoeService::kSdoRequest, 0x20, false, true},
     {SdoCommand::kUploadRequest, CoeService::kSdoRequest, 0x40},
-    {SdoCommand::kUploadSegmentRequest, CoeService::kSdoRequest, 0x60},
+    {SdoCommand::kUploadSegmentRequest, CoeService::kSdoRequest, 0x60, true},
     {SdoCommand::kAbort, CoeService::kSdoRequest, kAbortSpecifier},
-    {SdoCommand::kUploadSegmentResponse, CoeService::kSdoResponse, 0x00},
-    {SdoCommand::kDownloadSegmentResponse, CoeService::kSdoResponse, 0x20},
-    {SdoCommand::kUploadResponse, CoeService::kSdoResponse, 0x40},
+    {SdoCommand::kUploadSegmentResponse, CoeService::kSdoResponse, 0x00, true, true},
+    {SdoCommand::kDownloadSegmentResponse, CoeService::kSdoResponse, 0x20, true},
+    {SdoCommand::kUploadResponse, CoeService::kSdoResponse, 0x40, false, true},
     {SdoCommand::kDownloadResponse, CoeService::kSdoResponse, 0x60},
 };
 
@@ -38,44 +40,32 @@ const Coding& CodingOf(SdoCommand command) {
                        [command](const Coding& coding) { return coding.command == command; });
 }
 
-bool IsSegment(SdoCommand command) {
-  return command == SdoCommand::kUploadSegmentResponse ||
-         command == SdoCommand::kDownloadSegmentRequest;
-}
-bool HasToggle(SdoCommand command) {
-  return IsSegment(command) || command == SdoCommand::kUploadSegmentRequest ||
-         command == SdoCommand::kDownloadSegmentResponse;
-}
-/// Carries the object's data, or the beginning of it.
-bool Initiates(SdoCommand command) {
-  return command == SdoCommand::kUploadResponse || command == SdoCommand::kDownloadRequest;
-}
-
 uint8_t CommandByte(const Sdo& sdo) {
-  auto byte = static_cast<uint8_t>(CodingOf(sdo.command).specifier);
-  if (HasToggle(sdo.command)) byte |= sdo.toggle ? kToggleBit : uint8_t{0};
-  if (IsSegment(sdo.command)) {
+  const Coding& coding = CodingOf(sdo.command);
+  uint8_t byte = coding.specifier;
+  if (coding.segment) byte |= sdo.toggle ? kToggleBit : uint8_t{0};
+  if (coding.segment && coding.data) {
     byte |= sdo.last ? kLastBit : uint8_t{0};
     // Only of the shortest segment are bytes unused.
     if (sdo.data.size() < kLeastSegment) {
       byte |= static_cast<uint8_t>((kLeastSegment - sdo.data.size()) << 1);
     }
-  } else if (Initiates(sdo.command)) {
+  } else if (coding.data) {
     byte |= kSizeBit;
     if (sdo.expedited) {
       byte |= static_cast<uint8_t>(kExpeditedBit | (kExpedited - sdo.data.size()) << 2);
     }
   }
-  const bool whole = Initiates(sdo.command) || sdo.command == SdoCommand::kUploadRequest ||
-                     sdo.command == SdoCommand::kDownloadResponse;
+  const bool whole = !coding.segment && sdo.command != SdoCommand::kAbort;
   if (whole && sdo.complete) byte |= kCompleteBit;
   return byte;
 }
 
 /// Bytes after the CoE header.
 size_t SdoBytes(const Sdo& sdo) {
-  if (IsSegment(sdo.command)) return std::max(kInitiate, 1 + sdo.data.size());
-  return kInitiate + (Initiates(sdo.command) && !sdo.expedited ? sdo.data.size() : 0);
+  const Coding& coding = CodingOf(sdo.command);
+  if (coding.segment && coding.data) return std::max(kInitiate, 1 + sdo.data.size());
+  return kInitiate + (coding.data && !sdo.expedited ? sdo.data.size() : 0);
 }
 
 void PutHeaders(CoeService service, uint16_t address, uint8_t counter, size_t bytes,
@@ -94,9 +84,10 @@ Sdo DecodeSdo(std::span<const uint8_t> bytes, CoeService service) {
     const bool same = coding.service == service || coding.command == SdoCommand::kAbort;
     if (same && coding.specifier == specifier) sdo.command = coding.command;
   }
-  if (HasToggle(sdo.command)) {
+  const Coding& coding = CodingOf(sdo.command);
+  if (coding.segment) {
     sdo.toggle = (command & kToggleBit) != 0;
-    if (!IsSegment(sdo.command)) return sdo;
+    if (!coding.data) return sdo;
     sdo.last = (command & kLastBit) != 0;
     sdo.data = bytes.subspan(1);
     if (sdo.data.size() == kLeastSegment) {
@@ -110,7 +101,7 @@ Sdo DecodeSdo(std::span<const uint8_t> bytes, CoeService service) {
     return sdo;
   }
   sdo.complete = (command & kCompleteBit) != 0;
-  if (!Initiates(sdo.command)) return sdo;
+  if (!coding.data) return sdo;
   sdo.expedited = (command & kExpeditedBit) != 0;
   if (sdo.expedited) {
     sdo.total = (command & kSizeBit) != 0 ? 4U - (command >> 2 & 3) : 4U;
@@ -164,10 +155,11 @@ void EncodeMailboxError(MailboxError detail, uint8_t counter, std::span<uint8_t>
 size_t EncodedSize(const Sdo& sdo) { return kMailboxHeader + kCoeHeader + SdoBytes(sdo); }
 
 void EncodeSdo(const Sdo& sdo, uint16_t address, uint8_t counter, std::span<uint8_t> mailbox) {
-  PutHeaders(CodingOf(sdo.command).service, address, counter, SdoBytes(sdo), mailbox);
+  const Coding& coding = CodingOf(sdo.command);
+  PutHeaders(coding.service, address, counter, SdoBytes(sdo), mailbox);
   const std::span<uint8_t> bytes = mailbox.subspan(kMailboxHeader + kCoeHeader);
   bytes[0] = CommandByte(sdo);
-  if (HasToggle(sdo.command)) {
+  if (coding.segment) {
     std::copy(sdo.data.begin(), sdo.data.end(), bytes.begin() + 1);
     return;
   }
@@ -175,7 +167,7 @@ void EncodeSdo(const Sdo& sdo, uint16_t address, uint8_t counter, std::span<uint
   bytes[3] = sdo.object.subindex;
   if (sdo.command == SdoCommand::kAbort) {
     Put<uint32_t>(bytes, 4, sdo.abort_code);
-  } else if (Initiates(sdo.command)) {
+  } else if (coding.data) {
     if (!sdo.expedited) Put<uint32_t>(bytes, 4, sdo.total);
     std::ranges::copy(sdo.data, bytes.subspan(sdo.expedited ? 4 : kInitiate).begin());
   }
