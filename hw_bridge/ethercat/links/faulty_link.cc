@@ -5,10 +5,7 @@
 namespace poise::ethercat {
 
 bool FaultyLink::Draw(double share) {
-  if (share <= 0) return false;
-  const bool hit = std::uniform_real_distribution<double>(0, 1)(random_) < share;
-  injected_ += hit ? 1 : 0;
-  return hit;
+  return share > 0 && std::uniform_real_distribution<double>(0, 1)(random_) < share;
 }
 
 bool FaultyLink::Send(std::span<const uint8_t> frame) {

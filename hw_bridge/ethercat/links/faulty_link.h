@@ -24,7 +24,6 @@ class FaultyLink final : public Link {
   FaultyLink(Link* link, uint64_t seed) : link_(link), random_(seed) {}
 
   void set_faults(const LinkFaults& faults) { faults_ = faults; }
-  int64_t injected() const { return injected_; }
 
   int64_t Now() const override { return link_->Now(); }
   bool Send(std::span<const uint8_t> frame) override;
@@ -40,7 +39,6 @@ class FaultyLink final : public Link {
   std::array<uint8_t, kMaxFrame> held_{};  // the late frame
   size_t held_size_ = 0;
   bool release_ = false;  // the late frame's turn has come
-  int64_t injected_ = 0;
 };
 
 }  // namespace poise::ethercat
