@@ -250,7 +250,7 @@ void Supervisor::Follow(int64_t age) {
     resume_left_ = resume_cycles_;
   }
   if (first) {
-    HoldStart();
+    Hold();
   } else if (!fresh) {
     UpdateLoss(age);
   } else {
@@ -258,9 +258,9 @@ void Supervisor::Follow(int64_t age) {
   }
 }
 
-void Supervisor::HoldStart() {
+void Supervisor::Hold() {
   if (state_ != Status::STATE_HOLDING) {
-    std::fill(hold_torque_.begin(), hold_torque_.end(), 0.0);
+    hold_torque_ = applied_;  // none at the start
     hold_counts_ = monitor_.counts();
   }
   Enter(Status::STATE_HOLDING, last_refusal_);
@@ -269,11 +269,7 @@ void Supervisor::HoldStart() {
 void Supervisor::UpdateLoss(int64_t age) {
   const int64_t damping_after = int64_t{config_.settings.damping_after_cycles()} + hold_cycles_;
   if (age <= damping_after) {
-    if (state_ == Status::STATE_RUNNING) {
-      hold_torque_ = applied_;
-      hold_counts_ = monitor_.counts();
-    }
-    Enter(Status::STATE_HOLDING, last_refusal_);
+    Hold();
   } else if (age <= damping_after + config_.settings.stop_after_cycles()) {
     Enter(Status::STATE_DAMPING, last_refusal_);
   } else {

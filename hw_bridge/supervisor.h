@@ -97,7 +97,8 @@ class Supervisor {
   bool MayStart();
   void Reset(const joint_command_t* command);
   void UpdateState(int64_t cycle, const joint_command_t* command);
-  void HoldStart();
+  /// Holds the joints where they are, or goes on with it.
+  void Hold();
   void UpdateLoss(int64_t age);
   /// The first command is waited for with the joints held.
   bool AwaitsFirst() const {
