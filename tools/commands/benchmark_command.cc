@@ -12,6 +12,7 @@
 #include "tools/benchmark/benchmark_folder.h"
 #include "tools/charts/sweep_output.h"
 #include "tools/cli/command_line.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/shell_word.h"
 #include "tools/cli/temporary_dir.h"
@@ -49,10 +50,9 @@ std::string CommandLine() {
 }
 
 void CheckParts(const Benchmark& benchmark, const std::vector<std::string>& wanted) {
-  std::vector<std::string> names;
-  for (const BenchmarkPart& part : benchmark.part()) names.push_back(part.name());
+  const std::vector<std::string> names = NamesOf(benchmark.part());
   for (const std::string& name : wanted) {
-    if (std::find(names.begin(), names.end(), name) != names.end()) continue;
+    if (IsAmong(name, names)) continue;
     throw ConfigError(fmt::format("--part {}: the set {} has no such part; {}", name,
                                   benchmark.name(), Suggest(name, names)));
   }
@@ -93,14 +93,14 @@ int RunBenchmark(const BenchmarkArguments& arguments) {
   for (int i = 0; i < benchmark.part_size(); ++i) {
     const std::vector<std::string>& wanted = arguments.parts;
     const std::string& name = benchmark.part(i).name();
-    if (wanted.empty() || std::ranges::find(wanted, name) != wanted.end()) indexes.push_back(i);
+    if (wanted.empty() || IsAmong(name, wanted)) indexes.push_back(i);
   }
   // All parts are checked before an hour's work begins, and before anything is written.
   {
     const TemporaryDir tried("poise-benchmark");
     set.Write(tried.path());
     for (int i = 0; i < benchmark.part_size(); ++i) {
-      const bool wanted = std::ranges::find(indexes, i) != indexes.end();
+      const bool wanted = IsAmong(i, indexes);
       const fs::path place = PartFolder(arguments.session.out, benchmark.part(i));
       const bool there = arguments.session.resume && fs::exists(place / kResultsFile);
       if (!wanted && !there) continue;
@@ -140,7 +140,7 @@ int RunBenchmark(const BenchmarkArguments& arguments) {
     // With --resume more points than these may be there.
     SweepRows rows;
     for (const auto& [key, row] : session.rows()) {
-      if (std::find(points.begin(), points.end(), row.run) != points.end()) rows[key] = row;
+      if (IsAmong(row.run, points)) rows[key] = row;
     }
     WriteSweepFiles(session.folder(), session.header(), rows);
     all_ran = AllRan(rows) && all_ran;

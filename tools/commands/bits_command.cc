@@ -11,6 +11,7 @@
 #include "logging/log_reader.h"
 #include "logging/replay/bits.h"
 #include "tools/cli/cli_checks.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/signals.h"
 #include "tools/cli/temporary_dir.h"
@@ -92,7 +93,7 @@ int Bits(const BitsArguments& arguments) {
   std::vector<std::string> known;
   for (const ordered_json& entry : record.at("runs")) known.push_back(entry.at("name"));
   for (const std::string& name : arguments.names) {
-    if (std::find(known.begin(), known.end(), name) == known.end()) {
+    if (!IsAmong(name, known)) {
       throw ConfigError(fmt::format("there is no record of '{}'; {}", name, Suggest(name, known)));
     }
   }
@@ -102,7 +103,7 @@ int Bits(const BitsArguments& arguments) {
   for (ordered_json& entry : record.at("runs")) {
     const auto name = entry.at("name").get<std::string>();
     const std::vector<std::string>& wanted = arguments.names;
-    if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), name) == wanted.end()) continue;
+    if (!wanted.empty() && !IsAmong(name, wanted)) continue;
     fmt::print("{}: ", name);
     std::fflush(stdout);
     const std::vector<ChannelBits> seen = RunEntry(entry, arguments, &versions);

@@ -1,8 +1,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <filesystem>
+#include <optional>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_rules.h"
@@ -11,6 +11,7 @@
 #include "hw_bridge/ethercat/links/socket_link.h"
 #include "tools/cli/cli_checks.h"
 #include "tools/cli/command_line.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
@@ -48,12 +49,9 @@ ethercat::LinkConfig ParseLink(const std::string& text) {
     link.mutable_udp()->set_address(rest.substr(0, colon));
     rest = rest.substr(colon + 1);
   }
-  uint32_t port = 0;
-  const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), port);
-  if (error != std::errc() || end != rest.data() + rest.size()) {
-    throw ConfigError(fmt::format("--link {}: the port is no number", text));
-  }
-  link.mutable_udp()->set_port(port);
+  const std::optional<uint32_t> port = NumberIn<uint32_t>(rest);
+  if (!port) throw ConfigError(fmt::format("--link {}: the port is no number", text));
+  link.mutable_udp()->set_port(*port);
   CheckFields(link, fmt::format("--link {}: ", text));
   return link;
 }

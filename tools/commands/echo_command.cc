@@ -15,6 +15,7 @@
 #include "poise/health_t.hpp"
 #include "tools/cli/cli_checks.h"
 #include "tools/cli/command_line.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
 #include "tools/live/message_text.h"
@@ -143,7 +144,7 @@ void CheckLive(const LiveRun& live, const EchoOptions& options, EchoOutput* outp
     return;
   }
   const std::vector<std::string> names = live.ChannelNames();
-  if (std::find(names.begin(), names.end(), options.channel) == names.end()) {
+  if (!IsAmong(options.channel, names)) {
     throw ConfigError(fmt::format("run {}: has no channel '{}'; {}", live.spec().run_id(),
                                   options.channel, Suggest(options.channel, names)));
   }

@@ -92,8 +92,7 @@ int DoAll(std::vector<Line>& lines, OperatorAct::Kind kind) {
 /// `exit_code` fail: no run is passed over in silence.
 std::vector<Line> AllLines(OperatorAct::Kind kind, int* exit_code) {
   const std::vector<RunningRun> runs = RunningRuns();
-  const bool any_own =
-      std::any_of(runs.begin(), runs.end(), [](const RunningRun& run) { return run.own; });
+  const bool any_own = std::ranges::any_of(runs, [](const RunningRun& run) { return run.own; });
   if (!any_own) OnlyRunningRun("poise log info", "poise estop");  // throws what there is instead
   std::vector<Line> lines;
   for (const RunningRun& run : runs) {

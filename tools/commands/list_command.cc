@@ -15,6 +15,7 @@
 #include "logging/metrics/metrics.h"
 #include "logging/printable.h"
 #include "tools/cli/command_line.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/output_style.h"
 #include "tools/cli/plain_streams.h"
 #include "tools/commands/commands.h"
@@ -73,7 +74,7 @@ ChannelsByType GraphChannels() {
     const Graph graph = GraphFiles(InstalledFile("graphs", name).string()).Merged();
     for (const Channel& channel : graph.channel()) {
       std::vector<std::string>& names = channels[channel.type()];
-      if (std::find(names.begin(), names.end(), channel.name()) == names.end()) {
+      if (!IsAmong(channel.name(), names)) {
         names.push_back(channel.name());
       }
     }
@@ -109,7 +110,7 @@ int ListMessages(const ListRequest& request) {
   }
   std::string type = request.name;
   for (const auto& [carried, names] : channels) {
-    if (std::find(names.begin(), names.end(), request.name) != names.end()) type = carried;
+    if (IsAmong(request.name, names)) type = carried;
   }
   const MessageEntry& message = FindMessage(messages, type);
   fmt::print("{}", request.markdown ? MessagesAsMarkdown({message}, channels)

@@ -12,6 +12,7 @@
 #include "fmt/format.h"
 #include "tools/cli/child_process.h"
 #include "tools/cli/command_line.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/output_style.h"
 #include "tools/cli/progress.h"
@@ -97,8 +98,7 @@ std::vector<Job> MakeJobs(const MatrixOptions& options) {
     std::set<std::string> columns;
     for (const Ablation& ablation : Ablations()) {
       columns.insert(ablation.name);
-      if (wanted.empty() ||
-          std::find(wanted.begin(), wanted.end(), ablation.name) != wanted.end()) {
+      if (wanted.empty() || IsAmong(ablation.name, wanted)) {
         jobs.push_back(MakeJob(scenario, name, "", ablation, options.world));
       }
     }

@@ -1,4 +1,3 @@
-#include <charconv>
 #include <filesystem>
 #include <memory>
 #include <stdexcept>
@@ -10,6 +9,7 @@
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "tools/cli/command_line.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/terminal.h"
 #include "tools/cli/text_table.h"
 #include "tools/commands/commands.h"
@@ -27,24 +27,14 @@ constexpr char kWhichRun[] = "folder or name of the run; default: the only one t
 constexpr double kMostWeights = 10;  // a push beyond is a slip of the hand: no robot withstands one
 
 double NumberOf(std::string_view text, const std::string& flag) {
-  double value = 0;
-  const char* const end = text.data() + text.size();
-  const auto result = std::from_chars(text.data(), end, value);
-  if (result.ec != std::errc() || result.ptr != end || text.empty()) {
-    throw ConfigError(fmt::format("{}: '{}' is no number", flag, text));
-  }
-  return value;
+  if (const auto number = NumberIn<double>(text)) return *number;
+  throw ConfigError(fmt::format("{}: '{}' is no number", flag, text));
 }
 
 /// "x,y,z".
 std::vector<double> NumbersOf(std::string_view text, size_t count, const std::string& flag) {
   std::vector<double> numbers;
-  while (true) {
-    const size_t comma = text.find(',');
-    numbers.push_back(NumberOf(text.substr(0, comma), flag));
-    if (comma == std::string_view::npos) break;
-    text.remove_prefix(comma + 1);
-  }
+  for (const std::string& part : Split(text, ',')) numbers.push_back(NumberOf(part, flag));
   if (numbers.size() != count) {
     throw ConfigError(fmt::format("{}: needs {} numbers with commas between them, has {}", flag,
                                   count, numbers.size()));

@@ -16,6 +16,7 @@
 #include "logging/replay/component_replay.h"
 #include "logging/replay/log_player.h"
 #include "tools/cli/command_line.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/progress.h"
 #include "tools/cli/signals.h"
@@ -52,19 +53,16 @@ struct ReplayOptions {
 
 /// Indexes in the graph of the components asked for; all when none is.
 std::vector<int> Wanted(const RunSpec& spec, const std::vector<std::string>& names) {
-  std::vector<std::string> known;
-  for (const ComponentInstance& instance : spec.graph().component()) {
-    known.push_back(instance.name());
-  }
+  const std::vector<std::string> known = NamesOf(spec.graph().component());
   for (const std::string& name : names) {
-    if (std::find(known.begin(), known.end(), name) == known.end()) {
+    if (!IsAmong(name, known)) {
       throw ConfigError(fmt::format("--component {}: the log's graph has none of that name; {}",
                                     name, Suggest(name, known)));
     }
   }
   std::vector<int> wanted;
   for (size_t i = 0; i < known.size(); ++i) {
-    if (names.empty() || std::find(names.begin(), names.end(), known[i]) != names.end()) {
+    if (names.empty() || IsAmong(known[i], names)) {
       wanted.push_back(static_cast<int>(i));
     }
   }

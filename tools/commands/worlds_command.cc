@@ -276,9 +276,8 @@ int Worlds(WorldsArguments arguments) {
     }
     fmt::print("\n{}\n", FormatWorlds(worlds));
     csv += WorldsCsv(name, worlds);
-    const bool ran = std::all_of(worlds.begin(), worlds.end(), [](const WorldRun& world) {
-      return world.result.problem.empty();
-    });
+    const bool ran = std::ranges::all_of(
+        worlds, [](const WorldRun& world) { return world.result.problem.empty(); });
     if (ran) wrenches += CompareWrenches(name, worlds);
   }
   if (!scenarios.empty()) {

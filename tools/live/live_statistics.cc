@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "components/framework/run.h"
+#include "tools/cli/lists.h"
 
 namespace poise {
 namespace {
@@ -58,10 +59,7 @@ LiveSnapshot LiveStatistics::Take(int64_t now) {
   snapshot.bridge = bridge_;
   snapshot.bus = bus_;
   first_ = newest_;
-  std::vector<std::string> names;
-  for (const ComponentInstance& instance : spec_.graph().component()) {
-    names.push_back(instance.name());
-  }
+  std::vector<std::string> names = NamesOf(spec_.graph().component());
   names.push_back(kRecorderName);
   for (const std::string& name : names) {
     LiveSnapshot::Process row;

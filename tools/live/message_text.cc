@@ -11,8 +11,7 @@ namespace {
 constexpr char kTick[] = "tick";
 
 bool Selected(const std::vector<Scalar>& fields, std::string_view path) {
-  return std::any_of(fields.begin(), fields.end(),
-                     [&](const Scalar& field) { return field.path == path; });
+  return std::ranges::any_of(fields, [&](const Scalar& field) { return field.path == path; });
 }
 
 std::string ShortValue(const Scalar& scalar) {
@@ -85,9 +84,8 @@ std::vector<NamedTable> NamedTables(const std::vector<Scalar>& fields) {
       ++i;
       continue;
     }
-    const auto same = std::find_if(tables.begin(), tables.end(), [&](const NamedTable& other) {
-      return other.elements == table.elements;
-    });
+    const auto same = std::ranges::find_if(
+        tables, [&](const NamedTable& other) { return other.elements == table.elements; });
     if (same == tables.end()) {
       table.columns.push_back(std::move(column));
       tables.push_back(std::move(table));

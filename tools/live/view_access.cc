@@ -4,11 +4,11 @@
 
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <system_error>
 #include <utility>
 
 #include "fmt/format.h"
+#include "tools/cli/lists.h"
 
 namespace poise {
 std::optional<ViewTarget> ReadTarget(std::string_view target) {
@@ -29,10 +29,9 @@ std::optional<ViewTarget> ReadTarget(std::string_view target) {
       read.token = value;
     }
     if (key != "from" && key != "before") continue;
-    int64_t& tick = key == "from" ? read.from : read.before;
-    const char* const last = value.data() + value.size();
-    const auto [parsed, error] = std::from_chars(value.data(), last, tick);
-    if (error != std::errc() || parsed != last || tick < 0) return {};
+    const std::optional<int64_t> tick = NumberIn<int64_t>(value);
+    if (!tick || *tick < 0) return {};
+    (key == "from" ? read.from : read.before) = *tick;
   }
   return read;
 }

@@ -45,8 +45,7 @@ MessageEntry ParseFile(std::string_view file) {
 std::vector<MessageEntry> MessageReference() {
   std::vector<MessageEntry> messages;
   for (const std::string_view file : MessageDefinitions()) messages.push_back(ParseFile(file));
-  std::sort(messages.begin(), messages.end(),
-            [](const auto& a, const auto& b) { return a.type < b.type; });
+  std::ranges::sort(messages, [](const auto& a, const auto& b) { return a.type < b.type; });
   for (MessageEntry& message : messages) {
     const std::string package = message.type.substr(0, message.type.find('.') + 1);  // of poise ""
     for (const MessageEntry& other : messages) {

@@ -44,8 +44,7 @@ Window WindowOf(const RunSpec& spec, const KillOptions& options) {
 void KillSchedule::Check(const RunSpec& spec, const KillOptions& options) {
   StatusChannel(spec.graph());
   const auto& instances = spec.graph().component();
-  if (std::none_of(instances.begin(), instances.end(),
-                   [](const ComponentInstance& c) { return c.restart(); })) {
+  if (std::ranges::none_of(instances, [](const ComponentInstance& c) { return c.restart(); })) {
     throw ConfigError(
         fmt::format("graph {}: --kill needs components with restart: true", spec.graph().name()));
   }

@@ -18,6 +18,7 @@
 #include "fmt/chrono.h"
 #include "fmt/format.h"
 #include "logging/printable.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/output_place.h"
 #include "tools/run/live_run.h"
 #include "tools/run/run_dir.h"
@@ -147,7 +148,7 @@ std::vector<fs::path> RegistryDirs() {
   const auto add = [&](const fs::path& own) {
     if (!own.is_absolute() || !BelongsTo(own, geteuid())) return;
     const fs::path dir = own / "poise";
-    if (std::find(dirs.begin(), dirs.end(), dir) == dirs.end()) dirs.push_back(dir);
+    if (!IsAmong(dir, dirs)) dirs.push_back(dir);
   };
   if (const char* const xdg = std::getenv("XDG_RUNTIME_DIR"); xdg != nullptr) add(xdg);
   // It counts also when the environment does not tell it, as under cron.
@@ -212,8 +213,7 @@ std::vector<RunningRun> RunningRuns() {
     Describe(&run);
     runs.push_back(std::move(run));
   }
-  std::sort(runs.begin(), runs.end(),
-            [](const RunningRun& a, const RunningRun& b) { return a.age < b.age; });
+  std::ranges::sort(runs, [](const RunningRun& a, const RunningRun& b) { return a.age < b.age; });
   return runs;
 }
 
@@ -327,8 +327,7 @@ fs::path RunNamed(const std::string& name, std::string_view command) {
   const std::vector<fs::path> dirs = RunsNamed(name);
   if (dirs.size() == 1) return dirs.front();
   std::vector<RunningRun> runs = RunningRuns();
-  std::erase_if(
-      runs, [&](const RunningRun& run) { return std::ranges::find(dirs, run.dir) == dirs.end(); });
+  std::erase_if(runs, [&](const RunningRun& run) { return !IsAmong(run.dir, dirs); });
   // They may have ended meanwhile.
   if (runs.empty()) throw ConfigError(fmt::format("{}: this run has ended", dirs.front().string()));
   throw NameOne(fmt::format("several runs are called '{}'; name one", logging::ForTerminal(name)),

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "tools/cli/lists.h"
 #include "tools/scenario/registry.h"
 
 namespace poise {
@@ -26,16 +27,15 @@ std::vector<std::string> RemovableParts() {
 std::vector<FieldChange> AblationChanges(const std::vector<std::string>& parts, bool ideal) {
   std::vector<FieldChange> changes;
   for (const RemovablePart& part : Parts()) {
-    if (std::find(parts.begin(), parts.end(), part.name) == parts.end()) continue;
+    if (!IsAmong(part.name, parts)) continue;
     changes.push_back({part.field + "=false", "--without " + part.name});
   }
   if (!ideal) return changes;
   for (const auto& [type, entry] : Components().entries()) {
     for (const std::string& set : entry.traits.ideal) {
-      const bool known =
-          std::any_of(changes.begin(), changes.end(), [&](const FieldChange& change) {
-            return change.set == set;  // of another engine
-          });
+      const bool known = std::ranges::any_of(changes, [&](const FieldChange& change) {
+        return change.set == set;  // of another engine
+      });
       if (!known) changes.push_back({set, "--ideal"});
     }
   }

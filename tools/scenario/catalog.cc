@@ -10,6 +10,7 @@
 #include "components/framework/configuration/suggest.h"
 #include "components/framework/modules.h"
 #include "fmt/format.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/text_table.h"
 
 namespace poise {
@@ -45,7 +46,7 @@ bool IsOtherKind(const std::string& kind, const fs::path& file) {
 /// True for "base/NAME".
 bool IsBase(const fs::path& name) {
   const fs::path folder = name.parent_path();
-  return std::find(folder.begin(), folder.end(), "base") != folder.end();
+  return IsAmong("base", folder);
 }
 
 /// The text of a robot's folder: that of the folder's name, or the only one.
@@ -161,7 +162,7 @@ std::vector<std::string> NearestLast(const std::string& name, const std::set<std
   for (const std::string& near : Nearest(fs::path(name).filename().string(), last)) {
     for (const std::string& each : names) {
       const bool meant = fs::path(each).filename() == near;
-      if (meant && std::ranges::find(found, each) == found.end()) found.push_back(each);
+      if (meant && !IsAmong(each, found)) found.push_back(each);
     }
   }
   return found;
@@ -203,7 +204,7 @@ std::vector<std::string> NearestLast(const std::string& name, const std::set<std
       } else if (there && bases == BaseFiles::kRefused && IsBase(name)) {
         place += " (which others build on: name the file itself to run it)";
       }
-      if (std::ranges::find(searched, place) == searched.end()) searched.push_back(place);
+      if (!IsAmong(place, searched)) searched.push_back(place);
     }
     // A file beside may be of any kind: it is named where its name is near alone.
     names.merge(NamesThere(candidates, name));

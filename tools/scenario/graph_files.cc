@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <iterator>
 
 #include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
+#include "tools/cli/lists.h"
 
 namespace poise {
 namespace {
@@ -36,9 +38,8 @@ void GraphFiles::Merge() {
           Remove(name, merged_.mutable_channel(), &channels_)) {
         continue;
       }
-      std::vector<std::string> names;
-      for (const ComponentInstance& each : merged_.component()) names.push_back(each.name());
-      for (const Channel& each : merged_.channel()) names.push_back(each.name());
+      std::vector<std::string> names = NamesOf(merged_.component());
+      std::ranges::move(NamesOf(merged_.channel()), std::back_inserter(names));
       files_[f].Fail(fmt::format("remove[{}]", i),
                      names.empty() ? "there is no base to remove from; name one with base"
                                    : fmt::format("the base has no component or channel '{}'; {}",

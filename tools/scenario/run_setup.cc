@@ -23,6 +23,7 @@
 #include "components/framework/run.h"
 #include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
+#include "tools/cli/lists.h"
 #include "tools/scenario/catalog.h"
 #include "tools/scenario/configure_watch.h"
 #include "tools/scenario/described_components.h"
@@ -128,9 +129,8 @@ void ConnectWhere(const Scenario& scenario, ComponentInstance* instance, Graph* 
       return std::find_if(channels.begin(), channels.end(),
                           [&](const Channel& channel) { return channel.name() == name; });
     };
-    const auto output = std::find_if(outputs.begin(), outputs.end(), [&](const Connection& each) {
-      return each.port() == optional.port;
-    });
+    const auto output = std::ranges::find_if(
+        outputs, [&](const Connection& each) { return each.port() == optional.port; });
     if (wanted && output == outputs.end()) {
       const std::string name = InCapitals(optional.port);
       if (channel_named(name) == channels.end()) {
@@ -215,8 +215,7 @@ void CheckEngineOf(const std::vector<std::string>& changes, const Graph& graph) 
 /// Puts components of `graph` into the process of that name.
 void PutInto(const std::string& process, const std::vector<std::string>& components,
              const std::string& flag, Graph* graph) {
-  std::vector<std::string> names;
-  for (const ComponentInstance& instance : graph->component()) names.push_back(instance.name());
+  const std::vector<std::string> names = NamesOf(graph->component());
   for (const std::string& component : components) {
     const auto found = std::ranges::find(names, component);
     if (found == names.end()) {
@@ -247,13 +246,9 @@ void HostComponents(const RunChanges& changes, Graph* graph) {
   for (const std::string& host : changes.host) {
     const std::string flag = "--host " + host;
     const size_t equals = host.find('=');
-    std::vector<std::string> names;
-    for (size_t at = equals; at != std::string::npos;) {
-      const size_t end = host.find(',', at + 1);
-      names.push_back(host.substr(at + 1, end == std::string::npos ? end : end - at - 1));
-      at = end;
-    }
-    if (equals == 0 || names.size() < 2) {
+    const std::string_view parts = std::string_view(host).substr(equals + 1);
+    const std::vector<std::string> names = Split(parts, ',');
+    if (equals == 0 || equals == std::string::npos || names.size() < 2) {
       throw ConfigError(flag + ": must be PROCESS=A,B: two or more components of the graph");
     }
     PutInto(host.substr(0, equals), names, flag, graph);
@@ -302,7 +297,7 @@ bool IsThere(const OptionalPort& port, const Scenario& scenario) {
 std::string EngineOfField(const std::string& field) {
   const std::string section = field.substr(0, field.find_first_of(".[="));
   const std::vector<std::string> engines = EngineNames();
-  return std::ranges::find(engines, section) != engines.end() ? section : "";
+  return IsAmong(section, engines) ? section : "";
 }
 
 RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes) {
@@ -411,7 +406,7 @@ void ChangeConfigurations(const std::vector<std::string>& changes, RunSpec* spec
       const ComponentInstance& instance = graph.component(i);
       const std::vector<std::string> sections = SectionsOf(TypeOf(instance));
       names.insert(names.end(), sections.begin(), sections.end());
-      if (std::ranges::find(sections, section) == sections.end()) continue;
+      if (!IsAmong(section, sections)) continue;
       if (ConfigField(section) == nullptr) continue;
       taken = true;
       const int config = ConfigIndex(*spec, instance);

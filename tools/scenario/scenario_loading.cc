@@ -15,6 +15,7 @@
 #include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
 #include "logging/metrics/metrics.h"
+#include "tools/cli/lists.h"
 #include "tools/reference/schemas.h"
 #include "tools/scenario/catalog.h"
 #include "tools/scenario/former_fields.h"
@@ -84,8 +85,7 @@ std::string NoVariant(const std::string& name, const std::vector<std::string>& n
 bool IsChanged(const LoadedScenario& loaded, std::string_view field,
                std::initializer_list<std::string_view> flags = {}) {
   return std::ranges::any_of(loaded.changes, [&](const FieldChange& change) {
-    return (flags.size() == 0 || std::ranges::find(flags, change.by) != flags.end()) &&
-           PathOf(loaded, change) == field;
+    return (flags.size() == 0 || IsAmong(change.by, flags)) && PathOf(loaded, change) == field;
   });
 }
 
@@ -212,24 +212,17 @@ void ApplyChange(const FieldChange& change, LoadedScenario* loaded) {
   if (path == "drive_profile") ReadDriveProfile(loaded);
 }
 
-std::vector<std::string> VariantNames(const Scenario& scenario) {
-  std::vector<std::string> names;
-  for (const Variant& variant : scenario.variant()) names.push_back(variant.name());
-  return names;
-}
-
 void CheckReference(const LoadedScenario& loaded) {
-  const std::vector<std::string> names = VariantNames(loaded.scenario);
+  const std::vector<std::string> names = NamesOf(loaded.scenario.variant());
   const std::string& reference = loaded.scenario.reference();
-  if (loaded.scenario.has_reference() &&
-      std::find(names.begin(), names.end(), reference) == names.end()) {
+  if (loaded.scenario.has_reference() && !IsAmong(reference, names)) {
     FailField(loaded, "reference", NoVariant(reference, names));
   }
 }
 
 /// Checks the variants' names, and that of the reference.
 void CheckVariants(const LoadedScenario& loaded) {
-  const std::vector<std::string> names = VariantNames(loaded.scenario);
+  const std::vector<std::string> names = NamesOf(loaded.scenario.variant());
   std::set<std::string> taken;
   for (size_t i = 0; i < names.size(); ++i) {
     const auto fail = [&](const std::string& problem) {
@@ -264,7 +257,7 @@ void ApplyIdeal(LoadedScenario* loaded) {
 }
 
 void ApplyVariant(const std::string& name, LoadedScenario* loaded) {
-  const std::vector<std::string> names = VariantNames(loaded->scenario);
+  const std::vector<std::string> names = NamesOf(loaded->scenario.variant());
   const auto found = std::find(names.begin(), names.end(), name);
   if (found == names.end()) {
     throw ConfigError(
@@ -505,8 +498,7 @@ std::string FormatChanges(const Scenario& scenario) {
     by = change.by();
   }
   const auto& ablations = scenario.applied().ablation();
-  if (scenario.ideal().has_reason() &&
-      std::find(ablations.begin(), ablations.end(), "--ideal") != ablations.end()) {
+  if (scenario.ideal().has_reason() && IsAmong("--ideal", ablations)) {
     text += fmt::format("\n--ideal: {}", scenario.ideal().reason());
   }
   return text.empty() ? "" : text + "\n";

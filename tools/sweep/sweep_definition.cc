@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <boost/uuid/name_generator_sha1.hpp>
 #include <boost/uuid/uuid_io.hpp>
-#include <charconv>
 #include <filesystem>
 #include <set>
 
@@ -17,6 +16,7 @@
 #include "components/framework/modules.h"
 #include "fmt/format.h"
 #include "logging/metrics/metrics.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/text_table.h"
 #include "tools/scenario/catalog.h"
@@ -36,7 +36,7 @@ constexpr char kMachineMetric[] = "real_time_factor";
 /// Throws ConfigError for what is no engine: a run would blame a change that nobody made.
 void CheckEngine(const std::string& engine) {
   const std::vector<std::string> engines = EngineNames();
-  if (std::ranges::find(engines, engine) != engines.end()) return;
+  if (IsAmong(engine, engines)) return;
   throw ConfigError(
       fmt::format("--world: there is no engine '{}'; {}", engine, Suggest(engine, engines)));
 }
@@ -44,23 +44,6 @@ void CheckEngine(const std::string& engine) {
 std::string Digest(const std::string& text) {
   const boost::uuids::name_generator_sha1 generator(boost::uuids::ns::oid());
   return boost::uuids::to_string(generator(text));
-}
-
-std::optional<double> Number(std::string_view text) {
-  double number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc() || end != text.data() + text.size() || text.empty()) return {};
-  return number;
-}
-
-std::vector<std::string> Split(std::string_view text, char at) {
-  std::vector<std::string> parts;
-  while (true) {
-    const size_t end = text.find(at);
-    parts.emplace_back(text.substr(0, end));
-    if (end == std::string_view::npos) return parts;
-    text.remove_prefix(end + 1);
-  }
 }
 
 /// True for what starts like a field of a scenario, not a name of one's own.
@@ -73,17 +56,15 @@ bool IsField(const std::string& name) {
 bool ParseRange(const std::string& text, Variable* variable) {
   const std::vector<std::string> parts = Split(text, ':');
   if (parts.size() < 2) return false;
-  const std::optional<double> from = Number(parts[0]);
-  const std::optional<double> to = Number(parts[1]);
+  const std::optional<double> from = NumberIn<double>(parts[0]);
+  const std::optional<double> to = NumberIn<double>(parts[1]);
   if (!from || !to) return false;
   variable->set_from(*from);
   variable->set_to(*to);
   for (size_t i = 2; i < parts.size(); ++i) {
-    int steps = 0;
-    const char* const end = parts[i].data() + parts[i].size();
-    const auto parsed = std::from_chars(parts[i].data(), end, steps);
-    if (i == 2 && parsed.ec == std::errc() && parsed.ptr == end) {
-      variable->set_steps(steps);
+    const std::optional<int> steps = i == 2 ? NumberIn<int>(parts[i]) : std::nullopt;
+    if (steps) {
+      variable->set_steps(*steps);
     } else if (parts[i] == "log") {
       variable->set_scale(Variable::LOGARITHMIC);
     } else if (parts[i] == "angle") {
@@ -118,8 +99,8 @@ Variable ParseVary(const std::string& text) {
     }
   } else {
     const std::vector<std::string> values = Split(rest, ',');
-    const bool numbers = std::all_of(values.begin(), values.end(),
-                                     [](const std::string& v) { return Number(v).has_value(); });
+    const bool numbers = std::ranges::all_of(
+        values, [](const std::string& v) { return NumberIn<double>(v).has_value(); });
     if (!numbers && !field) {
       throw ConfigError(
           fmt::format("--vary {}: '{}' is no field of a scenario, so its values must "
@@ -128,7 +109,7 @@ Variable ParseVary(const std::string& text) {
     }
     for (const std::string& value : values) {
       if (numbers) {
-        variable.add_value(*Number(value));
+        variable.add_value(*NumberIn<double>(value));
       } else {
         Choice* const choice = variable.add_choice();
         choice->set_name(value);
@@ -308,7 +289,7 @@ SweepDefinition::SweepDefinition(const SweepArguments& arguments, bool limit)
     source.Fail(error.field(), error.problem());
   }
   const std::vector<std::string> drives = EmulatedDrives();
-  if (sweep.has_drives() && std::ranges::find(drives, sweep.drives()) == drives.end()) {
+  if (sweep.has_drives() && !IsAmong(sweep.drives(), drives)) {
     source.Fail("drives", fmt::format("is '{}'; it is {}, or left out", sweep.drives(),
                                       fmt::join(drives, " or ")));
   }
@@ -385,15 +366,14 @@ void SweepDefinition::SetColumns(const Source& source, const Scenario& scenario)
     if (metric.name != kMachineMetric) metrics.push_back(metric.name);
   }
   const auto add = [&](const std::string& name) {
-    if (std::find(columns_.begin(), columns_.end(), name) == columns_.end() &&
-        name != kMachineMetric) {
+    if (!IsAmong(name, columns_) && name != kMachineMetric) {
       columns_.push_back(name);
     }
   };
   for (int i = 0; i < sweep().column_size(); ++i) {
     if (sweep().column(i) == kAllMetrics) {
       for (const std::string& name : metrics) add(name);
-    } else if (std::find(metrics.begin(), metrics.end(), sweep().column(i)) != metrics.end()) {
+    } else if (IsAmong(sweep().column(i), metrics)) {
       add(sweep().column(i));
     } else {
       source.Fail(fmt::format("column[{}]", i), logging::NoMetric(sweep().column(i)));
@@ -411,7 +391,7 @@ void SweepDefinition::CheckRequired(const Source& source, const Scenario& scenar
   }
   for (int i = 0; i < sweep().require_size(); ++i) {
     const std::string& name = sweep().require(i);
-    if (std::ranges::find(limited, name) != limited.end()) continue;
+    if (IsAmong(name, limited)) continue;
     source.Fail(
         fmt::format("require[{}]", i),
         fmt::format("the scenario checks no limit of '{}'; {}", name,
@@ -426,13 +406,12 @@ void SweepDefinition::CheckMaps(const Source& source) const {
     const SweepMap& map = sweep().map(i);
     for (const auto& [field, name] : {std::pair{"x", map.x()}, std::pair{"y", map.y()}}) {
       if (name.empty() && field[0] == 'y') continue;
-      if (std::find(names.begin(), names.end(), name) == names.end()) {
+      if (!IsAmong(name, names)) {
         source.Fail(fmt::format("map[{}].{}", i, field),
                     fmt::format("no variable named '{}'; {}", name, Suggest(name, names)));
       }
     }
-    if (map.value() != "stands" &&
-        std::find(columns_.begin(), columns_.end(), map.value()) == columns_.end()) {
+    if (map.value() != "stands" && !IsAmong(map.value(), columns_)) {
       source.Fail(fmt::format("map[{}].value", i),
                   fmt::format("is '{}', which is no column of the table; it is \"stands\" or one "
                               "of {}",

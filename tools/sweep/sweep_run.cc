@@ -17,6 +17,7 @@
 #include "logging/metrics/schedule_plan.h"
 #include "logging/recording/inline_record.h"
 #include "logging/recording/inline_recorder.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/temporary_dir.h"
 #include "tools/cli/text_table.h"
 #include "tools/report/fall_story.h"
@@ -112,7 +113,7 @@ void ReadEvents(const logging::RunRecord& run, SweepRow* row) {
   const auto fall = std::ranges::find(events, std::string("fall"), &logging::Event::name);
   std::vector<std::string> troubles;
   const auto add = [&](const std::string& name) {
-    if (std::ranges::find(troubles, name) == troubles.end()) troubles.push_back(name);
+    if (!IsAmong(name, troubles)) troubles.push_back(name);
   };
   if (fall != events.end()) {
     row->fell_at = fall->time;
@@ -129,7 +130,7 @@ void ReadEvents(const logging::RunRecord& run, SweepRow* row) {
 void Judge(const Scenario& scenario, const std::vector<std::string>& required,
            const logging::RunRecord& run, SweepRow* row) {
   for (const CheckResult& check : EvaluateChecks(scenario, run)) {
-    if (check.passed || std::ranges::find(required, check.name) == required.end()) continue;
+    if (check.passed || !IsAmong(check.name, required)) continue;
     row->outcome = kMissed;
     row->reason += fmt::format("{}{}: {}, must be {}", row->reason.empty() ? "" : "; ", check.label,
                                FormatMeasured(check), FormatLimit(check));

@@ -1,7 +1,6 @@
 #include "tools/sweep/sweep_session.h"
 
 #include <algorithm>
-#include <charconv>
 #include <deque>
 #include <filesystem>
 #include <map>
@@ -16,6 +15,7 @@
 #include "logging/printable.h"
 #include "tools/cli/cli_checks.h"
 #include "tools/cli/command_line.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/progress.h"
 #include "tools/cli/signals.h"
@@ -31,19 +31,12 @@ namespace fs = std::filesystem;
 
 constexpr int kPoll = 50;  // ms
 
-std::optional<int64_t> WholeNumber(std::string_view text) {
-  int64_t number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc() || end != text.data() + text.size() || text.empty()) return {};
-  return number;
-}
-
 /// The two numbers around `at`.
 std::optional<std::pair<int64_t, int64_t>> Pair(std::string_view text, char at) {
   const size_t middle = text.find(at);
   if (middle == std::string_view::npos) return {};
-  const auto first = WholeNumber(text.substr(0, middle));
-  const auto second = WholeNumber(text.substr(middle + 1));
+  const auto first = NumberIn<int64_t>(text.substr(0, middle));
+  const auto second = NumberIn<int64_t>(text.substr(middle + 1));
   if (!first || !second) return {};
   return std::pair{*first, *second};
 }
@@ -182,9 +175,8 @@ std::string HeaderProblem(const SweepHeader& header, const SweepHeader& found) {
 }
 
 int64_t CountDone(int64_t first, int64_t end, const SweepRows& rows) {
-  return std::count_if(rows.begin(), rows.end(), [&](const auto& row) {
-    return row.second.run >= first && row.second.run < end;
-  });
+  return std::ranges::count_if(
+      rows, [&](const auto& row) { return row.second.run >= first && row.second.run < end; });
 }
 
 std::vector<int64_t> PointRange(int64_t first, int64_t end) {
@@ -222,7 +214,7 @@ struct PointSearch {
   /// The next value that is wanted and not asked for.
   std::optional<double> Next() {
     for (const double value : search.Wanted()) {
-      if (std::find(asked.begin(), asked.end(), value) != asked.end()) continue;
+      if (IsAmong(value, asked)) continue;
       asked.push_back(value);
       return value;
     }

@@ -7,6 +7,7 @@
 
 #include "fmt/format.h"
 #include "logging/printable.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/text_table.h"
 
 namespace poise {
@@ -198,9 +199,7 @@ std::string FormatOutcomes(const SweepHeader& header, const SweepRows& rows) {
     }
   }
   text += "\n";
-  const auto has = [&](const char* column) {
-    return std::ranges::find(header.columns, column) != header.columns.end();
-  };
+  const auto has = [&](const char* column) { return IsAmong(column, header.columns); };
   if (has("step_needed_time") && has("step_warning_time")) text += FormatWarnings(rows);
   text += FormatMissed(header, rows);
   text += FormatUntold(header, rows);

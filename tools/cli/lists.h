@@ -1,0 +1,48 @@
+// Small questions to lists and texts.
+#pragma once
+
+#include <algorithm>
+#include <charconv>
+#include <iterator>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+namespace poise {
+
+template <class Value, class List>
+bool IsAmong(const Value& value, const List& list) {
+  return std::ranges::find(list, value) != std::ranges::end(list);
+}
+
+/// The names of a message's elements, in their order.
+template <class List>
+std::vector<std::string> NamesOf(const List& list) {
+  std::vector<std::string> names;
+  for (const auto& each : list) names.push_back(each.name());
+  return names;
+}
+
+/// The number that the whole text is; empty: it is none.
+template <class Number>
+std::optional<Number> NumberIn(std::string_view text) {
+  Number number{};
+  const char* const last = text.data() + text.size();
+  const auto [end, error] = std::from_chars(text.data(), last, number);
+  return error == std::errc() && end == last ? std::optional(number) : std::nullopt;
+}
+
+/// "a", "b", "" of "a,b," and ','.
+inline std::vector<std::string> Split(std::string_view text, char at) {
+  std::vector<std::string> parts;
+  while (true) {
+    const size_t end = text.find(at);
+    parts.emplace_back(text.substr(0, end));
+    if (end == std::string_view::npos) return parts;
+    text.remove_prefix(end + 1);
+  }
+}
+
+}  // namespace poise
