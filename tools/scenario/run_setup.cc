@@ -3,9 +3,12 @@
 #include <google/protobuf/message.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <iterator>
 #include <map>
@@ -24,8 +27,8 @@
 #include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
 #include "tools/cli/lists.h"
+#include "tools/cli/stall_watch.h"
 #include "tools/scenario/catalog.h"
-#include "tools/scenario/configure_watch.h"
 #include "tools/scenario/described_components.h"
 #include "tools/scenario/graph_files.h"
 #include "tools/scenario/library_versions.h"
@@ -273,6 +276,14 @@ void AddResource(RunSpec* spec, const std::string& name, const std::string& file
   throw ConfigError(lines);
 }
 
+/// Ends the program for a Configure that does not return, which nothing else can.
+[[noreturn]] void EndHanging(const ComponentInstance& component) {
+  fmt::print(stderr, "poise: {} hangs: its Configure has not returned for {} s\n", component.name(),
+             kReadyPatience / 1'000'000'000);
+  std::fflush(nullptr);
+  _exit(1);
+}
+
 bool PortsFree(int first, int count) {
   for (int port = first; port < first + count; ++port) {
     const FileDescriptor fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
@@ -337,8 +348,13 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes) {
 BoundGraph ConfigureRun(const LoadedScenario& loaded, RunSpec* spec) {
   CheckSharedProcesses(spec->graph());
   try {
-    ConfigureWatch watch(*spec);
-    BoundGraph graph(*spec, Components(), watch.configuring());
+    std::atomic<int> configuring{-1};  // component of the graph; -1: none
+    const StallThread watch(
+        kReadyPatience, [&] { return configuring.load(); },
+        [&](int64_t component) {
+          EndHanging(spec->graph().component(static_cast<int>(component)));
+        });
+    BoundGraph graph(*spec, Components(), &configuring);
     FillPlan(graph.plan(), spec->mutable_graph());
     return graph;
   } catch (const GraphError& error) {
