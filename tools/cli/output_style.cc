@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "tools/cli/output_place.h"
-#include "tools/cli/plain_streams.h"
 
 namespace poise {
 namespace {
@@ -110,7 +109,7 @@ const OutputStyle& ScreenStyle() {
 }
 
 std::string Toned(std::string_view text, Tone tone) {
-  constexpr std::array<std::string_view, 5> kCodes = {"", "1", "2", "32", "31;1"};
+  constexpr std::array<std::string_view, 4> kCodes = {"", "1", "32", "31;1"};
   const std::string_view code = kCodes[static_cast<size_t>(tone)];
   if (!ScreenStyle().colour || code.empty() || text.empty()) return std::string(text);
   std::string toned = "\x1b[";

@@ -19,7 +19,7 @@ struct OutputStyle {
 /// terminal unless $NO_COLOR is set or $TERM is dumb; Unicode where the locale is UTF-8.
 const OutputStyle& ScreenStyle();
 
-enum class Tone { kPlain, kStrong, kDim, kGood, kBad };
+enum class Tone { kPlain, kStrong, kGood, kBad };
 
 /// `text` in the colour of `tone`, where stdout shows colours.
 std::string Toned(std::string_view text, Tone tone);
@@ -47,5 +47,7 @@ std::string PlainText(std::string_view text);
 /// Makes PlainText of what is written to stdout and stderr where the locale cannot show Unicode.
 /// Call once, before anything is written.
 void UsePlainStreams();
+/// What this program prints is for a file: it stays UTF-8 where UsePlainStreams would change it.
+void KeepUnicode();
 
 }  // namespace poise

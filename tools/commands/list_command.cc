@@ -17,7 +17,6 @@
 #include "tools/cli/command_line.h"
 #include "tools/cli/lists.h"
 #include "tools/cli/output_style.h"
-#include "tools/cli/plain_streams.h"
 #include "tools/commands/commands.h"
 #include "tools/reference/reference_text.h"
 #include "tools/run/run_dir.h"

@@ -6,7 +6,6 @@
 #include "fmt/format.h"
 #include "tools/cli/command_line.h"
 #include "tools/cli/output_style.h"
-#include "tools/cli/plain_streams.h"
 #include "tools/cli/text_table.h"
 #include "tools/commands/commands.h"
 #include "tools/report/html_report.h"
