@@ -260,10 +260,10 @@ int Pack(const PackOptions& options) {
   const fs::path log = FindLog(options.run);
   const fs::path packed = PackedName(log);
   CatchStopSignals();
-  RemakeProgress progress(log);
+  StatusLine line(/*quiet=*/false);
   const logging::PackResult result =
-      logging::PackLog(log.string(), packed.string(), Components(), progress.OnTick());
-  progress.Clear();
+      logging::PackLog(log.string(), packed.string(), Components(), ShowRemake(log, &line));
+  line.Clear();
   if (!options.keep) fs::remove(log);
   fmt::print(
       "{}: {} in place of {}: this build has made all {} ticks again, bit for bit, and makes them "

@@ -8,26 +8,23 @@
 
 namespace poise {
 
-RemakeProgress::RemakeProgress(const std::filesystem::path& log)
-    : log_(log), start_(NowNanoseconds()), line_(/*quiet=*/false) {}
-
-logging::OnTick RemakeProgress::OnTick() {
-  return [this](int64_t ticks, int64_t of) {
-    const double wall = 1e-9 * static_cast<double>(NowNanoseconds() - start_);
-    if (line_.Due(wall)) {
-      line_.Show(fmt::format("{}: {} of {} ticks made again", log_.filename().string(), ticks, of),
-                 wall);
-    }
-    return StopSignal() == 0;
-  };
+logging::OnTick ShowRemake(const std::filesystem::path& log, StatusLine* line) {
+  return
+      [name = log.filename().string(), line, start = NowNanoseconds()](int64_t ticks, int64_t of) {
+        const double wall = 1e-9 * static_cast<double>(NowNanoseconds() - start);
+        if (line->Due(wall)) {
+          line->Show(fmt::format("{}: {} of {} ticks made again", name, ticks, of), wall);
+        }
+        return StopSignal() == 0;
+      };
 }
 
 void MakeLogAgain(const std::filesystem::path& packed, const std::filesystem::path& log) {
   CatchStopSignals();
-  RemakeProgress progress(log);
+  StatusLine line(/*quiet=*/false);
   const logging::PackResult result =
-      logging::UnpackLog(packed.string(), log.string(), Components(), progress.OnTick());
-  progress.Clear();
+      logging::UnpackLog(packed.string(), log.string(), Components(), ShowRemake(log, &line));
+  line.Clear();
   fmt::print(stderr, "{}: made again, {}; poise log pack takes it away again\n", log.string(),
              FormatBytes(static_cast<int64_t>(result.bytes)));
 }
