@@ -45,4 +45,14 @@ inline std::vector<std::string> Split(std::string_view text, char at) {
   }
 }
 
+/// "a, b, c" of {"a", "b", "c"} and ", ". Not fmt::join, which GCC 12 misreads.
+inline std::string Joined(const std::vector<std::string>& parts, std::string_view separator) {
+  std::string text;
+  for (const std::string& part : parts) {
+    if (!text.empty()) text += separator;
+    text += part;
+  }
+  return text;
+}
+
 }  // namespace poise

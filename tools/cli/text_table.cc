@@ -20,11 +20,7 @@ struct ColumnWidth {
 
 int LongestWord(const std::string& text) {
   int longest = 0;
-  for (size_t begin = 0; begin < text.size();) {
-    const size_t end = std::min(text.find(' ', begin), text.size());
-    longest = std::max(longest, DisplayWidth(std::string_view(text).substr(begin, end - begin)));
-    begin = end + 1;
-  }
+  for (const std::string& word : Split(text, ' ')) longest = std::max(longest, DisplayWidth(word));
   return longest;
 }
 
@@ -63,16 +59,6 @@ std::vector<int> Fit(const std::vector<ColumnWidth>& all, const std::vector<size
   return widths;
 }
 
-std::vector<std::string> Lines(const std::string& text) {
-  std::vector<std::string> lines;
-  for (size_t begin = 0; begin <= text.size();) {
-    const size_t end = std::min(text.find('\n', begin), text.size());
-    lines.push_back(text.substr(begin, end - begin));
-    begin = end + 1;
-  }
-  return lines;
-}
-
 std::string Block(const std::vector<TableRow>& rows, const std::vector<size_t>& columns,
                   const std::vector<int>& widths) {
   std::string text;
@@ -80,7 +66,7 @@ std::string Block(const std::vector<TableRow>& rows, const std::vector<size_t>& 
     std::vector<std::vector<std::string>> cells;
     size_t height = 1;
     for (size_t k = 0; k < columns.size(); ++k) {
-      cells.push_back(Lines(Wrapped(rows[r][columns[k]].text, widths[k])));
+      cells.push_back(Split(Wrapped(rows[r][columns[k]].text, widths[k]), '\n'));
       height = std::max(height, cells.back().size());
     }
     for (size_t line = 0; line < height; ++line) {
@@ -158,16 +144,6 @@ std::string CsvLine(const std::vector<std::string>& cells) {
     line += CsvCell(cell);
   }
   return line + '\n';
-}
-
-// Not fmt::join, which GCC 12 misreads here.
-std::string Joined(const std::vector<std::string>& parts, std::string_view separator) {
-  std::string text;
-  for (const std::string& part : parts) {
-    if (!text.empty()) text += separator;
-    text += part;
-  }
-  return text;
 }
 
 }  // namespace poise

@@ -3,11 +3,11 @@
 
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "fmt/format.h"
 #include "logging/printable.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/output_style.h"
 
 namespace poise {
@@ -15,9 +15,6 @@ namespace poise {
 /// "12.35", "3": at most four digits, or all before the point.
 std::string FormatNumber(double value);
 std::string FormatNumber(double value, const std::string& unit);
-
-/// "a, b, c" of {"a", "b", "c"} and ", ".
-std::string Joined(const std::vector<std::string>& parts, std::string_view separator);
 
 struct TableCell {
   TableCell(const char* t) : text(t) {}               // NOLINT: a text is a cell

@@ -4,6 +4,7 @@
 #include <cctype>
 
 #include "fmt/format.h"
+#include "tools/cli/lists.h"
 
 namespace poise {
 namespace {
@@ -14,18 +15,9 @@ size_t Columns(std::string_view text) {
       text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }));
 }
 
-std::string Joined(const std::vector<std::string>& parts) {
-  std::string text;
-  for (const std::string& part : parts) {
-    if (!text.empty()) text += ", ";
-    text += part;
-  }
-  return text;
-}
-
 std::string ChannelsOf(const MessageEntry& message, const ChannelsByType& channels) {
   const auto found = channels.find(message.type);
-  return found == channels.end() ? "" : Joined(found->second);
+  return found == channels.end() ? "" : Joined(found->second, ", ");
 }
 
 /// Whether a comment says itself what holds without a value: "Default: that of the robot".
