@@ -14,7 +14,6 @@
 #include "tools/commands/commands.h"
 #include "tools/foxglove/live_foxglove.h"
 #include "tools/live/control_desk.h"
-#include "tools/live/live_page.h"
 #include "tools/live/live_start.h"
 #include "tools/live/run_status.h"
 #include "tools/live/tick_ring.h"
@@ -58,7 +57,7 @@ class Viewer {
         port_(options.control ? std::make_unique<BusPort>(live->spec()) : nullptr),
         desk_(port_ ? std::make_unique<ControlDesk>(port_.get()) : nullptr),
         ring_(live->spec(), TicksOf(options.keep, live->spec().tick_period())),
-        server_(options.port, LiveHtml(record, scenario, ChannelsJson(ring_), ring_.capacity()),
+        server_(options.port, LiveHtml(record, scenario, ring_.ChannelsJson(), ring_.capacity()),
                 &ring_, Control()),
         status_((live->dir() / "run.lcm").string(), scenario) {
     if (port_) port_->FollowSettings();

@@ -14,7 +14,7 @@
 #include "logging/recording/inline_recorder.h"
 #include "tools/cli/signals.h"
 #include "tools/live/control_desk.h"
-#include "tools/live/live_page.h"
+#include "tools/live/live_start.h"
 #include "tools/live/run_status.h"
 #include "tools/live/tick_ring.h"
 #include "tools/live/view_access.h"
@@ -53,8 +53,8 @@ class InteractiveRun {
     Open();
     recorder_->Flush();
     server_ = std::make_unique<ViewServer>(
-        options.port, LiveHtml(ReadRunStart(log_), scenario, ChannelsJson(ring_), ring_.capacity()),
-        &ring_,
+        options.port,
+        LiveHtml(ReadRunStart(log_), scenario, ring_.ChannelsJson(), ring_.capacity()), &ring_,
         ViewControl{MakeToken(), [this](std::string_view text) { return desk_.Receive(text); }});
     status_ = std::make_unique<RunStatus>(log_, scenario_);
   }

@@ -7,9 +7,10 @@
 #include <thread>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
+#include "logging/log_reader.h"
 #include "tools/cli/signals.h"
-#include "tools/live/live_page.h"
 #include "tools/scenario/former_fields.h"
 
 namespace poise {
@@ -27,6 +28,14 @@ void StandBack() {
   if (sched_setscheduler(0, SCHED_BATCH, &none) != 0 || setpriority(PRIO_PROCESS, 0, kNice) != 0) {
     fmt::print(stderr, "warning: this process runs at the run's own priority\n");
   }
+}
+
+logging::RunRecord ReadRunStart(const std::string& log) {
+  logging::LogReader reader(log);
+  logging::RunRecord record;
+  record.info = logging::ReadRunInfo(&reader, log, &record.spec);
+  record.robot = robot::LoadRobotTexts(record.info.robot, record.info.urdf);
+  return record;
 }
 
 logging::RunRecord ReadStart(const LiveRun& live, std::chrono::milliseconds patience) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <string>
 
 #include "logging/run_record.h"
 #include "tools/run/live_run.h"
@@ -13,8 +14,12 @@ namespace poise {
 /// one waits. Warns where the system does not allow it.
 void StandBack();
 
-/// RUN_INFO, as soon as the recorder has written it: info, spec and robot. Throws LogError when it
-/// does not within `patience`, ConfigError when it is of another run than `live`.
+/// RUN_INFO of a log that is being written, with the robot that it holds. Throws LogError,
+/// RobotError.
+logging::RunRecord ReadRunStart(const std::string& log);
+
+/// ReadRunStart, as soon as the recorder has written it: info, spec and robot. Throws LogError when
+/// it does not within `patience`, ConfigError when it is of another run than `live`.
 logging::RunRecord ReadStart(const LiveRun& live, std::chrono::milliseconds patience);
 
 /// The scenario of a run whose start was read. Throws ConfigError.

@@ -18,31 +18,29 @@ double LiveStatistics::Progress::RateSince(const Progress& from) const {
 }
 
 LiveStatistics::LiveStatistics(const RunSpec& spec, int64_t now)
-    : spec_(spec),
-      channels_(static_cast<size_t>(spec.graph().channel_size())),
-      interval_begin_(now) {
-  for (size_t i = 0; i < channels_.size(); ++i) {
-    channels_[i].external = spec.graph().channel(static_cast<int>(i)).external();
+    : spec_(spec), interval_begin_(now) {
+  for (const Channel& channel : spec.graph().channel()) {
+    ChannelCount& count = channels_.emplace_back();
+    count.row.name = channel.name();
+    count.row.type = channel.type();
+    count.external = channel.external();
   }
 }
 
 void LiveStatistics::AddMessage(int channel, int64_t tick, size_t bytes, int64_t now) {
   ChannelCount& count = channels_[static_cast<size_t>(channel)];
+  LiveSnapshot::ChannelRow& row = count.row;
   if (!count.external) {
-    if (count.tick >= 0 && tick > count.tick) count.missed += tick - count.tick - 1;
+    if (row.tick >= 0 && tick > row.tick) row.missed += tick - row.tick - 1;
     if (tick > newest_.tick) newest_ = {tick, now};
     if (first_.tick < 0) first_ = newest_;
   }
-  count.tick = std::max(count.tick, tick);
+  row.tick = std::max(row.tick, tick);
   ++count.messages;
-  count.last_bytes = static_cast<int64_t>(bytes);
-  count.bytes += count.last_bytes;
+  row.bytes_per_message = static_cast<int64_t>(bytes);
+  count.bytes += row.bytes_per_message;
   count.last_arrival = now;
 }
-
-void LiveStatistics::SetBus(const bus_status_t& status) { bus_ = status; }
-
-void LiveStatistics::SetBridge(const bridge_status_t& status) { bridge_ = status; }
 
 void LiveStatistics::SetProcess(const std::string& name, const ControlClient::Status& status) {
   if (!status.seen) return;
@@ -78,20 +76,13 @@ LiveSnapshot LiveStatistics::Take(int64_t now) {
     }
     snapshot.processes.push_back(std::move(row));
   }
-  for (int i = 0; i < spec_.graph().channel_size(); ++i) {
-    ChannelCount& count = channels_[static_cast<size_t>(i)];
-    LiveSnapshot::ChannelRow row;
-    row.name = spec_.graph().channel(i).name();
-    row.type = spec_.graph().channel(i).type();
-    row.tick = count.tick;
+  for (ChannelCount& count : channels_) {
+    LiveSnapshot::ChannelRow& row = snapshot.channels.emplace_back(count.row);
     row.rate = static_cast<double>(count.messages) / interval;
     row.bytes_per_second = static_cast<double>(count.bytes) / interval;
-    row.bytes_per_message = count.last_bytes;
-    row.age = count.last_bytes == 0 ? -1 : Seconds(now - count.last_arrival);
-    row.missed = count.missed;
+    row.age = row.bytes_per_message == 0 ? -1 : Seconds(now - count.last_arrival);
     count.messages = 0;
     count.bytes = 0;
-    snapshot.channels.push_back(std::move(row));
   }
   interval_begin_ = now;
   return snapshot;

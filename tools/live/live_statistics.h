@@ -50,20 +50,18 @@ class LiveStatistics {
 
   /// `channel`: index in the graph.
   void AddMessage(int channel, int64_t tick, size_t bytes, int64_t now);
-  void SetBridge(const bridge_status_t& status);
-  void SetBus(const bus_status_t& status);
+  void SetBridge(const bridge_status_t& status) { bridge_ = status; }
+  void SetBus(const bus_status_t& status) { bus_ = status; }
   void SetProcess(const std::string& name, const ControlClient::Status& status);
   /// The moment `now`; the next interval begins.
   LiveSnapshot Take(int64_t now);
 
  private:
   struct ChannelCount {
-    int64_t tick = -1;
-    int64_t messages = 0;  // of this interval
-    int64_t bytes = 0;     // of this interval
-    int64_t last_bytes = 0;
+    LiveSnapshot::ChannelRow row;  // but for rates and age
+    int64_t messages = 0;          // of this interval
+    int64_t bytes = 0;             // of this interval
     int64_t last_arrival = 0;
-    int64_t missed = 0;
     bool external = false;
   };
   struct Progress {

@@ -10,39 +10,32 @@ namespace {
 
 constexpr char kTick[] = "tick";
 
-bool Selected(const std::vector<Scalar>& fields, std::string_view path) {
-  return std::ranges::any_of(fields, [&](const Scalar& field) { return field.path == path; });
-}
+/// A value's text: a real's format, and how a text's own quotes are written.
+struct Format {
+  const char* real;
+  const char* quote;
+  std::string operator()(int64_t value) const { return fmt::format("{}", value); }
+  std::string operator()(double value) const { return fmt::format(fmt::runtime(real), value); }
+  std::string operator()(const std::string& value) const {
+    return '"' + logging::Printable(value, quote) + '"';
+  }
+};
 
 std::string ShortValue(const Scalar& scalar) {
-  struct Format {
-    std::string operator()(int64_t value) const { return fmt::format("{}", value); }
-    std::string operator()(double value) const { return fmt::format("{:.6g}", value); }
-    std::string operator()(const std::string& value) const {
-      return '"' + logging::Printable(value) + '"';
-    }
-  };
-  const std::string value = std::visit(Format{}, scalar.value);
+  const std::string value = std::visit(Format{"{:.6g}", "\\\""}, scalar.value);
   return scalar.name.empty() ? value : fmt::format("{}({})", value, scalar.name);
 }
 
 std::string CsvValue(const Scalar& scalar) {
-  struct Format {
-    std::string operator()(int64_t value) const { return fmt::format("{}", value); }
-    std::string operator()(double value) const { return fmt::format("{}", value); }
-    std::string operator()(const std::string& value) const {
-      return '"' + logging::Printable(value, "\"\"") + '"';
-    }
-  };
-  return std::visit(Format{}, scalar.value);
+  return std::visit(Format{"{}", "\"\""}, scalar.value);
 }
 
-/// One cell a field, the tick in front unless it is among them.
+/// One cell a field, in front the tick, if there is one, unless it is among them.
 template <class Cell>
-std::string Row(const std::optional<std::string>& tick, const std::vector<Scalar>& fields,
-                char separator, Cell cell) {
-  std::string row;
-  if (tick && !Selected(fields, kTick)) row = *tick;
+std::string Row(const std::string& tick, const std::vector<Scalar>& fields, char separator,
+                Cell cell) {
+  const bool selected = std::ranges::find(fields, kTick, &Scalar::path) != fields.end();
+  std::string row = selected ? "" : tick;
   for (const Scalar& field : fields) {
     if (!row.empty()) row += separator;
     row += cell(field);
@@ -115,9 +108,7 @@ std::string TableText(const NamedTable& table) {
 }  // namespace
 
 std::string MessageLine(std::optional<int64_t> tick, const std::vector<Scalar>& fields) {
-  std::optional<std::string> first;
-  if (tick) first = fmt::format("{}={}", kTick, *tick);
-  return Row(first, fields, ' ',
+  return Row(tick ? fmt::format("{}={}", kTick, *tick) : "", fields, ' ',
              [](const Scalar& field) { return field.path + '=' + ShortValue(field); });
 }
 
@@ -146,15 +137,11 @@ std::string MessageBlock(std::string_view title, const std::vector<Scalar>& fiel
 }
 
 std::string CsvHeader(bool has_tick, const std::vector<Scalar>& fields) {
-  std::optional<std::string> first;
-  if (has_tick) first = kTick;
-  return Row(first, fields, ',', [](const Scalar& field) { return field.path; });
+  return Row(has_tick ? kTick : "", fields, ',', [](const Scalar& field) { return field.path; });
 }
 
 std::string CsvRow(std::optional<int64_t> tick, const std::vector<Scalar>& fields) {
-  std::optional<std::string> first;
-  if (tick) first = fmt::format("{}", *tick);
-  return Row(first, fields, ',', CsvValue);
+  return Row(tick ? fmt::format("{}", *tick) : "", fields, ',', CsvValue);
 }
 
 bool Thinner::Pass(double time) {

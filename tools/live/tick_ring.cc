@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <nlohmann/json.hpp>
 
 #include "components/framework/run.h"
 #include "components/robot_files/robot_files.h"
@@ -38,6 +39,10 @@ float ToFloat(double value) {
 
 }  // namespace
 
+int64_t TicksOf(double seconds, double period) {
+  return std::max<int64_t>(1, std::llround(seconds / period));
+}
+
 /// Writes a message's scalars to their places in a tick.
 class TickRing::Filler : public ScalarVisitor {
  public:
@@ -53,16 +58,9 @@ class TickRing::Filler : public ScalarVisitor {
  private:
   void Put(double value) {
     if (next_ == kinds_.size()) return;
-    switch (kinds_[next_++]) {
-      case Kind::kNone:
-        break;
-      case Kind::kInteger:
-        *integers_++ = value;
-        break;
-      case Kind::kReal:
-        *reals_++ = ToFloat(value);
-        break;
-    }
+    const Kind kind = kinds_[next_++];
+    if (kind == Kind::kInteger) *integers_++ = value;
+    if (kind == Kind::kReal) *reals_++ = ToFloat(value);
   }
 
   const std::vector<Kind>& kinds_;
@@ -123,6 +121,21 @@ void TickRing::AddDerivedLane(const RunSpec& spec) {
            false,
            {}},
           derived_->signals().counts());
+}
+
+nlohmann::ordered_json TickRing::ChannelsJson() const {
+  using Json = nlohmann::ordered_json;
+  Json json = Json::array();
+  for (const Lane& lane : lanes_) {
+    Json item = {{"name", lane.name}, {"type", lane.type->name}, {"count", 0}};
+    if (lane.external) item["ticks"] = {{"value", nullptr}};
+    item["signals"] = Json::array();
+    for (const Signal& signal : lane.signals) {
+      item["signals"].push_back({{"field", signal.field}, {"integer", signal.integer}});
+    }
+    json.push_back(std::move(item));
+  }
+  return json;
 }
 
 void TickRing::Clear(int64_t tick) {

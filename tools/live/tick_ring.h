@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,9 @@
 #include "tools/run/live_run.h"
 
 namespace poise {
+
+/// Ticks of `seconds`, 1 at least.
+int64_t TicksOf(double seconds, double period);
 
 /// Every scalar of every channel of a run's graph by tick, and what follows from them (DERIVED):
 /// the signals of docs/reference/report_format.md. A tick is taken when all channels have it, or
@@ -35,6 +39,9 @@ class TickRing {
   /// In the graph's order, then DERIVED.
   const std::vector<Lane>& lanes() const { return lanes_; }
   int64_t capacity() const { return capacity_; }
+  /// Channels and their signals, without values:
+  /// docs/reference/report_format.md#a-run-in-progress.
+  nlohmann::ordered_json ChannelsJson() const;
 
   /// A message of LiveRun; HEALTH_* is passed over. One of an external channel stands at the newest
   /// tick that is not taken.

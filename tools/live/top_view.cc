@@ -197,20 +197,8 @@ void AddChannels(const LiveSnapshot& snapshot, std::vector<ViewLine>* lines) {
       {fmt::format("{:<{}} {:>9.1f}{:>28}", "all", name, rate, Rate(bytes)), Style::kPlain, label});
 }
 
-/// SGR sequence of a style.
-const char* Color(Style style) {
-  switch (style) {
-    case Style::kTitle:
-      return "\x1b[7m";
-    case Style::kWarning:
-      return "\x1b[33m";
-    case Style::kFailure:
-      return "\x1b[1;31m";
-    case Style::kPlain:
-      break;
-  }
-  return "";
-}
+// SGR sequences, by Style.
+constexpr const char* kColors[] = {"", "\x1b[7m", "\x1b[33m", "\x1b[1;31m"};
 
 }  // namespace
 
@@ -238,35 +226,14 @@ std::string PlainText(const std::vector<ViewLine>& lines) {
 
 void ViewScroll::Move(char key, int page) {
   constexpr int kAside = 8;  // characters
-  switch (key) {
-    case 'k':
-      --line;
-      break;
-    case 'j':
-      ++line;
-      break;
-    case 'b':
-      line -= page;
-      break;
-    case 'f':
-    case ' ':
-      line += page;
-      break;
-    case 'g':
-      line = 0;
-      break;
-    case 'G':
-      line = std::numeric_limits<int>::max() / 2;
-      break;
-    case 'h':
-      column -= kAside;
-      break;
-    case 'l':
-      column += kAside;
-      break;
-    default:
-      break;
-  }
+  if (key == 'k') --line;
+  if (key == 'j') ++line;
+  if (key == 'b') line -= page;
+  if (key == 'f' || key == ' ') line += page;
+  if (key == 'g') line = 0;
+  if (key == 'G') line = std::numeric_limits<int>::max() / 2;
+  if (key == 'h') column -= kAside;
+  if (key == 'l') column += kAside;
 }
 
 std::string Frame(const std::vector<ViewLine>& lines, int columns, int rows, ViewScroll* scroll) {
@@ -289,7 +256,8 @@ std::string Frame(const std::vector<ViewLine>& lines, int columns, int rows, Vie
 
   std::string frame = "\x1b[H";
   const auto show = [&](const std::string& text, Style style) {
-    frame += fmt::format("{}{}\x1b[0m\x1b[K", Color(style), text.substr(0, width));
+    frame += fmt::format("{}{}\x1b[0m\x1b[K", kColors[static_cast<size_t>(style)],
+                         text.substr(0, width));
   };
   for (size_t i = 0; i < header; ++i) {
     show(lines[i].text, lines[i].style);
