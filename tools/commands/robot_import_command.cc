@@ -24,16 +24,7 @@ struct ImportArguments {
   bool force = false;
 };
 
-Tone ToneOf(Sureness sureness) {
-  switch (sureness) {
-    case Sureness::kSure:
-      return Tone::kGood;
-    case Sureness::kLikely:
-      return Tone::kPlain;
-    default:
-      return Tone::kBad;
-  }
-}
+constexpr Tone kTones[] = {Tone::kGood, Tone::kPlain, Tone::kBad};  // by Sureness
 
 /// A robot's folder holds one text: with two nobody could say which --robot FOLDER means.
 void CheckOneText(const fs::path& folder, const fs::path& text) {
@@ -84,7 +75,10 @@ int ImportIt(ImportArguments arguments) {
 
   std::vector<TableRow> rows = {{"what", "value", "from", "how sure"}};
   for (const Finding& f : imported.findings) {
-    rows.push_back({f.what, f.value, f.from, {SurenessName(f.sureness), ToneOf(f.sureness)}});
+    rows.push_back({f.what,
+                    f.value,
+                    f.from,
+                    {SurenessName(f.sureness), kTones[static_cast<size_t>(f.sureness)]}});
   }
   fmt::print("{}", FormatColumns(std::move(rows)));
   if (!imported.defects.empty()) {

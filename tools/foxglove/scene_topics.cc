@@ -50,16 +50,9 @@ int64_t PictureTicks(const RunSpec& spec) {
   return std::max<int64_t>(1, std::llround(1 / (kPictures * spec.tick_period())));
 }
 
-foxglove::Log::Level LevelOf(std::string_view event) {
-  switch (LevelOfEvent(event)) {
-    case EventLevel::kError:
-      return foxglove::Log::ERROR;
-    case EventLevel::kWarning:
-      return foxglove::Log::WARNING;
-    default:
-      return foxglove::Log::INFO;
-  }
-}
+// By EventLevel.
+constexpr foxglove::Log::Level kLevels[] = {foxglove::Log::INFO, foxglove::Log::WARNING,
+                                            foxglove::Log::ERROR};
 
 /// Texts of a log may hold any bytes.
 std::string Utf8(std::string_view text) {
@@ -170,7 +163,7 @@ void SceneTopics::AddEvent(double time, std::string_view name, std::string_view 
   foxglove::Log log;
   const int64_t utime = Utime(time);
   *log.mutable_timestamp() = SceneTime(utime);
-  log.set_level(LevelOf(name));
+  log.set_level(kLevels[static_cast<size_t>(LevelOfEvent(name))]);
   log.set_name(Utf8(name));
   log.set_message(Utf8(detail.empty() ? name : detail));
   Publish(kEvents, utime, log);

@@ -86,14 +86,8 @@ void CheckLevel(const robot::LinkTree& tree, const std::array<Leg, 2>& legs,
 }  // namespace
 
 const char* SurenessName(Sureness sureness) {
-  switch (sureness) {
-    case Sureness::kSure:
-      return "sure";
-    case Sureness::kLikely:
-      return "likely";
-    default:
-      return "guess";
-  }
+  constexpr const char* kNames[] = {"sure", "likely", "guess"};
+  return kNames[static_cast<size_t>(sureness)];
 }
 
 int SideOfName(const std::string& name) {

@@ -16,7 +16,7 @@ using logging::TickMessages;
 // What stands still, as ROS 2's REP 105 names it for a pose that drifts and never jumps.
 constexpr const char* kOdometryFrame = "odom";
 constexpr const char* kNode = "poise";
-constexpr uint8_t kInfo = 20, kWarn = 30, kError = 40;  // levels of rcl_interfaces/msg/Log
+constexpr uint8_t kLevels[] = {20, 30, 40};  // INFO, WARN, ERROR of rcl_interfaces, by EventLevel
 
 int64_t EveryTick(const RunSpec& spec, double rate) {
   return std::max<int64_t>(1, std::llround(1 / (rate * spec.tick_period())));
@@ -37,17 +37,6 @@ geometry_msgs_msg_dds__Vector3_ Vector(const Eigen::Vector3d& v) { return {v.x()
 dds_sequence_double Numbers(std::span<const double> values) {
   const auto size = static_cast<uint32_t>(values.size());
   return {size, size, const_cast<double*>(values.data()), false};
-}
-
-uint8_t LogLevel(std::string_view event) {
-  switch (LevelOfEvent(event)) {
-    case EventLevel::kError:
-      return kError;
-    case EventLevel::kWarning:
-      return kWarn;
-    default:
-      return kInfo;
-  }
 }
 
 }  // namespace
@@ -183,7 +172,7 @@ void Ros2Publisher::AddEvent(double time, const std::string& name, const std::st
   const std::string text = logging::ForTerminal(detail.empty() ? name : detail);
   const std::string event = logging::ForTerminal(name);
   const rcl_interfaces_msg_dds__Log_ message{Stamp(std::llround(1e6 * at)),
-                                             LogLevel(name),
+                                             kLevels[static_cast<size_t>(LevelOfEvent(name))],
                                              Text(kNode),
                                              Text(text),
                                              Text(""),
