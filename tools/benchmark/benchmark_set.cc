@@ -109,21 +109,6 @@ void CheckSet(const Benchmark& benchmark, const std::string& file) {
   }
 }
 
-}  // namespace
-
-std::vector<Constant> BenchmarkRobot::constants() const {
-  std::vector<Constant> all;
-  for (const auto& [name, value] :
-       {std::pair{"robot_mass", mass}, std::pair{"robot_height", height},
-        std::pair{"robot_left_x", left_x}, std::pair{"robot_left_y", left_y},
-        std::pair{"robot_sole_length", sole_length}, std::pair{"robot_sole_width", sole_width}}) {
-    Constant& constant = all.emplace_back();
-    constant.set_name(name);
-    constant.set_value(value);
-  }
-  return all;
-}
-
 BenchmarkRobot ReadBenchmarkRobot(const std::string& name) {
   BenchmarkRobot robot;
   robot.name = name;
@@ -147,6 +132,21 @@ BenchmarkRobot ReadBenchmarkRobot(const std::string& name) {
   robot.sole_length = (high - low).x();
   robot.sole_width = (high - low).y();
   return robot;
+}
+
+}  // namespace
+
+std::vector<Constant> BenchmarkRobot::constants() const {
+  std::vector<Constant> all;
+  for (const auto& [name, value] :
+       {std::pair{"robot_mass", mass}, std::pair{"robot_height", height},
+        std::pair{"robot_left_x", left_x}, std::pair{"robot_left_y", left_y},
+        std::pair{"robot_sole_length", sole_length}, std::pair{"robot_sole_width", sole_width}}) {
+    Constant& constant = all.emplace_back();
+    constant.set_name(name);
+    constant.set_value(value);
+  }
+  return all;
 }
 
 BenchmarkSet::BenchmarkSet(const std::string& name, const BenchmarkSubject& subject)

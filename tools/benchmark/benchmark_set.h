@@ -37,14 +37,11 @@ struct BenchmarkRobot {
   std::vector<Constant> constants() const;
 };
 
-/// Throws ConfigError or RobotError.
-BenchmarkRobot ReadBenchmarkRobot(const std::string& name);
-
 class BenchmarkSet {
  public:
   /// `name`: of deploy/benchmarks, or a file. Throws ConfigError: no such file, a base or a change
   /// of it that cannot be, a part that is not whole, a controller that changes what is the
-  /// benchmark's.
+  /// benchmark's. RobotError.
   BenchmarkSet(const std::string& name, const BenchmarkSubject& subject);
 
   const Benchmark& benchmark() const { return benchmark_; }

@@ -20,6 +20,7 @@ constexpr SceneColor kRegion{0.92, 0.20, 0.20}, kCapture{0.90, 0.78, 0.20};
 constexpr SceneColor kCom{0.15, 0.75, 0.45}, kFoothold{0.90, 0.55, 0.95};
 
 constexpr double kLeastPush = 3;                 // N: below it the sensor's noise
+constexpr double kMetresPerNewton = 1.0 / 900;   // of arrow
 constexpr double kPushScale = 1.5;               // of a push's arrow beside the ground's
 constexpr double kThick = 0.018, kThin = 0.011;  // m, of arrows
 constexpr double kLine = 0.004;                  // m
@@ -34,6 +35,13 @@ std::vector<Vector3d> Placed(const Eigen::Isometry3d& frame,
     points.push_back(frame * Vector3d(corner.x(), corner.y(), kAbove));
   }
   return points;
+}
+
+/// True ones where the tick has them; empty when it has none.
+std::vector<pose_t> SolePoses(const TickMessages& tick) {
+  if (tick.truth) return tick.truth->foot_pose;
+  if (tick.planner) return tick.planner->foot_pose;
+  return {};
 }
 
 /// Adds the forces of the wrenches, none where `cop` is not known.
@@ -55,12 +63,6 @@ void AddFootForces(const TickMessages& tick, const std::vector<wrench_t>& wrench
 }
 
 }  // namespace
-
-std::vector<pose_t> SolePoses(const TickMessages& tick) {
-  if (tick.truth) return tick.truth->foot_pose;
-  if (tick.planner) return tick.planner->foot_pose;
-  return {};
-}
 
 ContactScene::ContactScene(const robot::RobotModel& model) {
   for (const robot::FootModel& foot : model.feet()) {

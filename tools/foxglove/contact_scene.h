@@ -8,9 +8,6 @@
 
 namespace poise {
 
-/// m of arrow a newton.
-inline constexpr double kMetresPerNewton = 1.0 / 900;
-
 class ContactScene {
  public:
   explicit ContactScene(const robot::RobotModel& model);
@@ -26,8 +23,5 @@ class ContactScene {
  private:
   std::vector<balance::ConvexPolygon> soles_;  // each in its own frame
 };
-
-/// Sole poses: true ones where the tick has them; empty when it has none.
-std::vector<pose_t> SolePoses(const logging::TickMessages& tick);
 
 }  // namespace poise

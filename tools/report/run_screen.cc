@@ -118,9 +118,24 @@ std::string ChecksOfVariant(const Scenario& scenario) {
       "The checks are those of the variant {}, in place of the scenario's.", found->name()));
 }
 
-bool SameFile(const fs::path& a, const fs::path& b) {
+/// How this program is called from here: "poise" when $PATH has it, else its shortest path.
+std::string ProgramName() {
   std::error_code error;
-  return fs::equivalent(a, b, error) && !error;
+  fs::path self = fs::read_symlink("/proc/self/exe", error);
+  if (error) return "poise";
+  if (self.filename() == "first_run") self.replace_filename("poise");  // which is built next
+  const char* const path = std::getenv("PATH");
+  const std::string_view folders = path == nullptr ? "" : path;
+  for (size_t begin = 0; begin < folders.size();) {
+    const size_t end = std::min(folders.find(':', begin), folders.size());
+    const fs::path candidate = fs::path(folders.substr(begin, end - begin)) / "poise";
+    begin = end + 1;
+    if (!fs::exists(candidate, error)) continue;
+    if (fs::equivalent(candidate, self, error) && !error) return "poise";
+    break;  // another one is called by that name
+  }
+  const std::string near = fs::proximate(self, error).string();
+  return error || near.starts_with("..") ? self.string() : near;
 }
 
 }  // namespace
@@ -237,25 +252,6 @@ std::string FormatNext(const Scenario& scenario, const std::vector<CheckResult>&
         "the same without each part of the controller");
   }
   return text;
-}
-
-std::string ProgramName() {
-  std::error_code error;
-  fs::path self = fs::read_symlink("/proc/self/exe", error);
-  if (error) return "poise";
-  if (self.filename() == "first_run") self.replace_filename("poise");  // which is built next
-  const char* const path = std::getenv("PATH");
-  const std::string_view folders = path == nullptr ? "" : path;
-  for (size_t begin = 0; begin < folders.size();) {
-    const size_t end = std::min(folders.find(':', begin), folders.size());
-    const fs::path candidate = fs::path(folders.substr(begin, end - begin)) / "poise";
-    begin = end + 1;
-    if (!fs::exists(candidate, error)) continue;
-    if (SameFile(candidate, self)) return "poise";
-    break;  // another one is called by that name
-  }
-  const std::string near = fs::proximate(self, error).string();
-  return error || near.starts_with("..") ? self.string() : near;
 }
 
 std::string FileAddress(const fs::path& file) {

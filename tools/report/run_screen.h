@@ -50,9 +50,6 @@ std::string FormatVerdictLines(const Scenario& scenario, const std::vector<Check
 std::string FormatNext(const Scenario& scenario, const std::vector<CheckResult>& checks,
                        const std::filesystem::path& dir, bool latest, const std::string& matrix);
 
-/// How this program is called from here: "poise" when $PATH has it, else its shortest path.
-std::string ProgramName();
-
 /// The address of a file, for a browser: "file:///home/me/report.html".
 std::string FileAddress(const std::filesystem::path& file);
 

@@ -38,6 +38,8 @@ double PitchBetween(const Vector3d& a, const Vector3d& b) {
   return std::atan2(a.z() * b.x() - a.x() * b.z(), a.x() * b.x() + a.z() * b.z());
 }
 
+/// Bends the leg's knee by `bend` rad in all, hip and ankle turned so that the foot stays below the
+/// hip and level. A leg without a knee about the lateral axis stays as it is.
 void BendLeg(const RobotModel& model, const Anatomy& anatomy, robot::Foot foot, double bend,
              Eigen::VectorXd* joints) {
   const Leg& leg = anatomy.leg[foot];
@@ -90,7 +92,11 @@ FoundStance StanceAt(const RobotModel& model, const Anatomy& anatomy,
   std::string problem;
   for (const double bend : kBends) {
     robot::PostureGoal goal;
-    goal.nominal = bend_knees ? WithBentKnees(model, anatomy, bend, nominal) : nominal;
+    goal.nominal = nominal;
+    if (bend_knees) {
+      for (const robot::Foot f : robot::kFeet) BendLeg(model, anatomy, f, bend, &goal.nominal);
+      goal.nominal = WithinLimits(model, goal.nominal);
+    }
     const robot::RobotData data = robot::Evaluate(model, goal.nominal);
     goal.com_height = Rounded(data.com.z() - 0.5 * (data.foot_pose[0].translation().z() +
                                                     data.foot_pose[1].translation().z()));
@@ -142,12 +148,6 @@ Eigen::VectorXd WithinLimits(const RobotModel& model, Eigen::VectorXd wanted) {
     wanted[j] = std::clamp(wanted[j], joint.lower + margin, joint.upper - margin);
   }
   return wanted;
-}
-
-Eigen::VectorXd WithBentKnees(const RobotModel& model, const Anatomy& anatomy, double bend,
-                              Eigen::VectorXd nominal) {
-  for (const robot::Foot f : robot::kFeet) BendLeg(model, anatomy, f, bend, &nominal);
-  return WithinLimits(model, nominal);
 }
 
 FoundStance FindStance(const RobotModel& model, const Anatomy& anatomy,

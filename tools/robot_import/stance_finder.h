@@ -24,11 +24,6 @@ struct FoundStance {
 /// Each joint at `wanted` or, where that is too near to a limit, away from it.
 Eigen::VectorXd WithinLimits(const robot::RobotModel& model, Eigen::VectorXd wanted);
 
-/// `nominal` with the legs' knees bent by `bend` rad in all, hips and ankles turned so that the
-/// foot stays below the hip and level. Legs without a knee about the lateral axis stay as they are.
-Eigen::VectorXd WithBentKnees(const robot::RobotModel& model, const Anatomy& anatomy, double bend,
-                              Eigen::VectorXd nominal);
-
 /// The nearest posture to `nominal` with both soles level, the COM above the middle between them,
 /// all within the joint limits. Tries less and more bend than the usual one when `bend_knees`. The
 /// feet stand as far apart as in `nominal`, or nearer, where only that lets the legs bear the robot

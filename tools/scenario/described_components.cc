@@ -1,9 +1,11 @@
 #include "tools/scenario/described_components.h"
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 
+#include "components/framework/component_type.h"
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/modules.h"
 #include "components/framework/run.h"
@@ -36,8 +38,7 @@ std::string OwnProgram(const ComponentInstance& instance) {
                      TypeOf(instance));
 }
 
-}  // namespace
-
+/// Throws ConfigError.
 ComponentType ReadDescription(const fs::path& file) {
   try {
     const Json json = Json::parse(ReadFile(file.string()));
@@ -71,6 +72,8 @@ ComponentType ReadDescription(const fs::path& file) {
                     file.string(), error.what()));
   }
 }
+
+}  // namespace
 
 void LoadDescriptions() {
   static bool done = false;

@@ -1,10 +1,8 @@
 // Component types that are programs in any language, known by what they say of themselves.
 #pragma once
 
-#include <filesystem>
 #include <string>
 
-#include "components/framework/component_type.h"
 #include "components/framework/graph.pb.h"
 
 namespace poise {
@@ -22,8 +20,5 @@ bool IsDescribed(const std::string& type);
 std::string OwnProgramOf(const Graph& graph);
 /// Throws ConfigError for one that is to share its process with others.
 void CheckSharedProcesses(const Graph& graph);
-
-/// One of them. Throws ConfigError.
-ComponentType ReadDescription(const std::filesystem::path& file);
 
 }  // namespace poise

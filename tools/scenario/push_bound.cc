@@ -22,6 +22,16 @@ namespace poise {
 using Eigen::Vector2d;
 using std::numbers::pi;
 
+double PendulumShare(Push::Profile profile, double duration, double frequency) {
+  const double wt = frequency * duration;
+  if (wt < 1e-9) return 1;
+  if (profile == Push::RECTANGLE) return -std::expm1(-wt) / wt;
+  return pi * pi * (1 + std::exp(-wt)) / (2 * (wt * wt + pi * pi));
+}
+
+namespace {
+
+/// N·s; `impulse_scale`: ImpulseScale (N·s), of which scaled_impulse is a share.
 double HorizontalImpulse(const Push& push, double impulse_scale) {
   const double horizontal = std::hypot(push.direction_x(), push.direction_y());
   const double all = std::hypot(horizontal, push.direction_z());
@@ -31,15 +41,6 @@ double HorizontalImpulse(const Push& push, double impulse_scale) {
                              : std::abs(push.peak()) * MeanOfPeak(push.profile()) * push.duration();
   return impulse * horizontal / all;
 }
-
-double PendulumShare(Push::Profile profile, double duration, double frequency) {
-  const double wt = frequency * duration;
-  if (wt < 1e-9) return 1;
-  if (profile == Push::RECTANGLE) return -std::expm1(-wt) / wt;
-  return pi * pi * (1 + std::exp(-wt)) / (2 * (wt * wt + pi * pi));
-}
-
-namespace {
 
 /// s from the push's begin to the first step's touch-down; empty: there was none.
 std::optional<double> StepTime(const Scenario& scenario, const logging::RunRecord& run) {

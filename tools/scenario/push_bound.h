@@ -37,10 +37,6 @@ struct PushBound {
 /// them, it has no bound. Empty when the scenario has hands, no push or but vertical ones.
 std::optional<PushBound> FindPushBound(const Scenario& scenario, const logging::RunRecord& run);
 
-/// N·s, horizontal impulse of a push; `impulse_scale`: ImpulseScale (N·s), of which scaled_impulse
-/// is a share.
-double HorizontalImpulse(const Push& push, double impulse_scale = 0);
-
 /// Share of a push's impulse that counts for an inverted pendulum: integral of f e^(-wt) dt over
 /// that of f, for its shape and duration (s), `frequency` w in 1/s.
 double PendulumShare(Push::Profile profile, double duration, double frequency);
