@@ -30,7 +30,11 @@ int64_t ExpectedLogSize(const RunSpec& spec);
 struct LogSizes {
   int64_t sum = 0;      ///< bytes
   int64_t largest = 0;  ///< bytes of one
-  void Add(int64_t size) { sum += size, largest = std::max(largest, size); }
+  void Add(int64_t size) { Add({size, size}); }
+  void Add(const LogSizes& more) {
+    sum += more.sum;
+    largest = std::max(largest, more.largest);
+  }
 };
 
 /// What to say before `logs` are written below `folder`, which need not exist yet: empty when they

@@ -244,8 +244,7 @@ int Worlds(WorldsArguments arguments) {
       checked.changes = ChangesFor(engine, checked.changes);
       const ScenarioRun run(scenario, checked);
       if (engine == engines.front()) names.push_back(run.name());
-      sizes.sum += run.log_sizes().sum;
-      sizes.largest = std::max(sizes.largest, run.log_sizes().largest);
+      sizes.Add(run.log_sizes());
     }
   }
   CheckSpace(arguments.out.empty() ? RunsDir() : fs::path(arguments.out), sizes, options.force);

@@ -87,6 +87,21 @@ void Retire(const fs::path& file, const struct stat& status) {
   if (!newer || rename(file.c_str(), ended.c_str()) != 0) unlink(file.c_str());
 }
 
+/// Adds the run in `dir` unless it is among them. `status`: of what is the user's whose run it is,
+/// and as old as the run.
+void AddRun(const fs::path& dir, const struct stat& status, std::vector<RunningRun>* runs) {
+  const auto known = [&](const RunningRun& other) { return other.dir == dir; };
+  if (dir.empty() || std::ranges::any_of(*runs, known)) return;
+  RunningRun run;
+  run.dir = dir;
+  run.user = UserName(status.st_uid);
+  run.own = status.st_uid == geteuid();
+  run.start = status.st_mtim.tv_sec;
+  run.age = AgeOf(status);
+  Describe(&run);
+  runs->push_back(std::move(run));
+}
+
 /// Adds the runs that are registered in a folder of `user`'s.
 void AddRuns(const fs::path& dir, uid_t user, std::vector<RunningRun>* runs) {
   if (!BelongsTo(dir, user)) return;
@@ -105,21 +120,11 @@ void AddRuns(const fs::path& dir, uid_t user, std::vector<RunningRun>* runs) {
       if (user == geteuid() && AgeOf(status) > kMinute) unlink(entry.path().c_str());
       continue;
     }
-    if (!Held(fd)) {
-      if (user == geteuid()) Retire(entry.path(), status);
-      continue;
+    if (Held(fd)) {
+      AddRun(ReadAll(fd), status, runs);
+    } else if (user == geteuid()) {
+      Retire(entry.path(), status);
     }
-    RunningRun run;
-    run.dir = ReadAll(fd);
-    run.user = UserName(user);
-    run.own = user == geteuid();
-    run.start = status.st_mtim.tv_sec;
-    run.age = AgeOf(status);
-    const bool known = std::any_of(runs->begin(), runs->end(),
-                                   [&](const RunningRun& other) { return other.dir == run.dir; });
-    if (run.dir.empty() || known) continue;
-    Describe(&run);
-    runs->push_back(std::move(run));
   }
 }
 
@@ -200,18 +205,9 @@ std::vector<RunningRun> RunningRuns() {
   for (const auto& [dir, user] : OtherUsersDirs()) AddRuns(dir, user, &runs);
   std::error_code error;
   const fs::path latest = fs::canonical(RunsDir() / "latest", error);
-  const bool known = std::any_of(runs.begin(), runs.end(),
-                                 [&](const RunningRun& run) { return run.dir == latest; });
   struct stat status {};
-  if (!error && !known && RunInProgress(latest) && stat(latest.c_str(), &status) == 0) {
-    RunningRun run;
-    run.dir = latest;
-    run.user = UserName(status.st_uid);
-    run.own = status.st_uid == geteuid();
-    run.start = status.st_mtim.tv_sec;
-    run.age = AgeOf(status);
-    Describe(&run);
-    runs.push_back(std::move(run));
+  if (!error && RunInProgress(latest) && stat(latest.c_str(), &status) == 0) {
+    AddRun(latest, status, &runs);
   }
   std::ranges::sort(runs, [](const RunningRun& a, const RunningRun& b) { return a.age < b.age; });
   return runs;

@@ -102,16 +102,15 @@ std::string UniqueName(const std::string& name, std::set<std::string>* taken) {
   return unique;
 }
 
+namespace {
+
+/// True when all passed.
 bool RunSeveral(const std::vector<std::string>& names, const RunOptions& options,
                 const std::string& out) {
   std::vector<ScenarioRun> runs;
   for (const std::string& name : ExpandScenarios(names)) runs.emplace_back(name, options);
   LogSizes sizes;
-  for (const ScenarioRun& run : runs) {
-    const LogSizes own = run.log_sizes();
-    sizes.sum += own.sum;
-    sizes.largest = std::max(sizes.largest, own.largest);
-  }
+  for (const ScenarioRun& run : runs) sizes.Add(run.log_sizes());
   CheckSpace(out.empty() ? RunsDir() : fs::path(out), sizes, options.force);
   const bool all = names.size() == 1;
   const RunDir folder = MakeRunDir(out, all ? kAllScenarios : "several", options.force);
@@ -144,6 +143,8 @@ bool RunSeveral(const std::vector<std::string>& names, const RunOptions& options
   fmt::print("{}\n", passed ? "all passed" : "FAILED");
   return passed;
 }
+
+}  // namespace
 
 int RunScenarios(const std::vector<std::string>& names, const RunOptions& options,
                  const std::string& out) {
