@@ -75,16 +75,13 @@ ordered_json FigureJson(const BenchmarkFigure& figure) {
     json["reason"] = figure.untold->reason;
     return json;
   }
-  const auto add = [&](const char* name, const std::optional<double>& value) {
-    json[name] = value ? ordered_json(*value) : ordered_json(nullptr);
-  };
-  add("value", figure.value);
+  json["value"] = OrNull(figure.value);
   json["unit"] = figure.unit;
   json["bound"] = figure.bound;
-  add("impulse", figure.impulse);
-  add("impulse_per_mass", figure.per_mass);
-  add("share_of_lip", figure.of_pendulum);
-  add("share_of_lip_of_duration", figure.of_duration);
+  json["impulse"] = OrNull(figure.impulse);
+  json["impulse_per_mass"] = OrNull(figure.per_mass);
+  json["share_of_lip"] = OrNull(figure.of_pendulum);
+  json["share_of_lip_of_duration"] = OrNull(figure.of_duration);
   return json;
 }
 

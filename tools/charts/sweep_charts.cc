@@ -26,8 +26,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr char kStandsValue[] = "stands";
 
-Json Number(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
-
 /// "poise run ..." of all that a sweep's runs have in common.
 std::string CommandOf(const Sweep& sweep, const std::string& what) {
   std::string command = "poise run ";
@@ -194,7 +192,7 @@ void Part::AddSweep(Json* part) const {
     if (!row.trouble.empty()) told += ", " + row.trouble;
     rows.push_back(RowJson(row, row.outcome, told));
     for (const std::string& metric : header_.columns) {
-      rows.back()["values"].push_back(Number(Value(row, metric)));
+      rows.back()["values"].push_back(OrNull(Value(row, metric)));
     }
   }
   (*part)["values"] = std::move(values);
@@ -262,7 +260,7 @@ void Part::AddLimits(Json* part) const {
     if (along) maps.push_back({{"x", *along}, {"value", values.size()}});
     values.push_back({{"name", column.name}, {"label", column.label}, {"unit", column.unit}});
     for (size_t i = 0; i < points.size(); ++i) {
-      rows[i]["values"].push_back(Number(column.get(points[i])));
+      rows[i]["values"].push_back(OrNull(column.get(points[i])));
     }
   }
   (*part)["values"] = std::move(values);

@@ -50,10 +50,7 @@ const TroubleWords* FindTrouble(std::string_view name) {
 }
 
 std::string Told(const Trouble& trouble) {
-  std::string text(FindTrouble(trouble.name)->words);
-  const size_t place = text.find("{}");
-  if (place != std::string::npos) text.replace(place, 2, trouble.detail);
-  return text;
+  return fmt::format(fmt::runtime(FindTrouble(trouble.name)->words), trouble.detail);
 }
 
 /// All before the fall, by their begin.

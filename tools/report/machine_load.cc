@@ -26,8 +26,6 @@ std::optional<int64_t> ReadStalled() {
 
 }  // namespace
 
-MachineLoadSampler::MachineLoadSampler() = default;
-
 void MachineLoadSampler::Sample(int64_t now) {
   if (now < next_) return;
   next_ = now + kInterval;

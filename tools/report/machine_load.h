@@ -19,7 +19,6 @@ struct MachineLoad {
 /// Samples /proc/loadavg and /proc/pressure/cpu from its making on.
 class MachineLoadSampler {
  public:
-  MachineLoadSampler();
   /// To be called often, `now`: ns. Reads ten times a second.
   void Sample(int64_t now);
   /// The load of all samples so far.

@@ -165,8 +165,7 @@ Json ScenarioPart(const std::vector<const MatrixCell*>& cells) {
     if (figure->paper_value) values.back()["paper"] = *figure->paper_value;
     for (size_t i = 0; i < cells.size(); ++i) {
       const CheckResult* const check = FindCheck(*cells[i], *figure);
-      const bool measured = check != nullptr && check->measured;
-      rows[i]["values"].push_back(measured ? Json(*check->measured) : Json(nullptr));
+      rows[i]["values"].push_back(OrNull(check == nullptr ? std::nullopt : check->measured));
     }
   }
   const MatrixCell& first = *cells.front();

@@ -136,10 +136,8 @@ nlohmann::ordered_json RealtimeJson(const RunSpec& spec, const RunOutcome& outco
   json["load"] = load.load;
   json["runnable"] = load.runnable;
   json["runnable_max"] = load.runnable_max;
-  json["cpu_pressure"] =
-      load.pressure ? nlohmann::ordered_json(*load.pressure) : nlohmann::ordered_json(nullptr);
-  json["crane_let_go"] = outcome.crane_let_go ? nlohmann::ordered_json(*outcome.crane_let_go)
-                                              : nlohmann::ordered_json(nullptr);
+  json["cpu_pressure"] = OrNull(load.pressure);
+  json["crane_let_go"] = OrNull(outcome.crane_let_go);
   json["ticks_not_followed"] = lost.ticks;
   json["for_want_of_a_command_in_time"] = lost.late;
   return json;

@@ -23,8 +23,6 @@ std::string EndOf(const RunOutcome& outcome) {
   return outcome.message.empty() ? "planned end" : outcome.message;
 }
 
-Json Optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
-
 void Evaluate(const logging::Metric& metric, const logging::RunRecord& run, CheckResult* result) {
   result->name = metric.name;
   result->unit = metric.unit;
@@ -61,6 +59,8 @@ Json HistogramJson(const health_t& health) {
 }
 
 }  // namespace
+
+Json OrNull(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 std::vector<std::string> SchedulingNames(int8_t scheduling) {
   std::vector<std::string> names;
@@ -103,14 +103,14 @@ Json ChecksJson(const std::vector<CheckResult>& checks) {
     if (check.limited()) limit = FormatLimit(check);
     json.push_back({{"name", check.name},
                     {"label", check.label},
-                    {"measured", Optional(check.measured)},
+                    {"measured", OrNull(check.measured)},
                     {"unit", check.unit},
                     {"joint", check.joint.empty() ? Json(nullptr) : Json(check.joint)},
                     {"limit", limit},
-                    {"at_most", Optional(check.at_most)},
-                    {"at_least", Optional(check.at_least)},
+                    {"at_most", OrNull(check.at_most)},
+                    {"at_least", OrNull(check.at_least)},
                     {"paper", check.paper.empty() ? Json(nullptr) : Json(check.paper)},
-                    {"paper_value", Optional(check.paper_value)},
+                    {"paper_value", OrNull(check.paper_value)},
                     {"passed", check.passed},
                     {"missing", check.missing}});
   }
@@ -130,13 +130,6 @@ int64_t FirstCheckedTick(const Scenario& scenario, const logging::RunRecord& run
                       static_cast<double>(run.spec.lead_ticks());
   const auto last = static_cast<double>(run.num_ticks);
   return tick > 0 ? static_cast<int64_t>(std::min(tick, last)) : 0;
-}
-
-const logging::Metric* MetricOfCheck(const Scenario& scenario, int index) {
-  const std::string& name = scenario.check(index).metric();
-  const logging::Metric* metric = logging::FindMetric(name);
-  if (metric != nullptr) return metric;
-  throw ConfigError(fmt::format("check[{}].metric", index), logging::NoMetric(name));
 }
 
 std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging::RunRecord& run) {
@@ -175,7 +168,10 @@ std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging:
   }
   for (int i = 0; i < scenario.check_size(); ++i) {
     const Check& check = scenario.check(i);
-    const logging::Metric* metric = MetricOfCheck(scenario, i);
+    const logging::Metric* metric = logging::FindMetric(check.metric());
+    if (metric == nullptr) {
+      throw ConfigError(fmt::format("check[{}].metric", i), logging::NoMetric(check.metric()));
+    }
     CheckResult result;
     result.label = check.label();
     if (check.has_at_most() && !part) result.at_most = check.at_most();
@@ -357,7 +353,7 @@ Json RunJson(const Scenario& scenario, const logging::RunRecord& run,
                    {"last_tick", run.spec.cut().last_tick()}};
   }
   json["simulated_time"] = run.time(run.num_ticks);
-  json["real_time_factor"] = Optional(run.real_time_factor);
+  json["real_time_factor"] = OrNull(run.real_time_factor);
   json["refused_health"] = run.refused_health;
   json["log"] = "run.lcm";
   json["components"] = ComponentsJson(run.health);

@@ -44,11 +44,9 @@ bool ChecksPass(const std::vector<CheckResult>& checks);
 /// First tick at or after check_from.
 int64_t FirstCheckedTick(const Scenario& scenario, const logging::RunRecord& run);
 
-/// The metric of scenario.check(index). Throws ConfigError when there is none of its name.
-const logging::Metric* MetricOfCheck(const Scenario& scenario, int index);
-
 /// The scenario's checks on a run, after those of every run: it reached its planned end, so did
-/// its reference, its log is whole, and each component did its work.
+/// its reference, its log is whole, and each component did its work. Throws ConfigError for a check
+/// without a metric of its name.
 std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging::RunRecord& run);
 
 /// A line for each figure that is not known: what it needs. `all`: those without a limit, too.
@@ -72,6 +70,9 @@ std::string FormatAssumptions(const Scenario& scenario);
 
 /// Words for SCHEDULING_* of health_t.
 std::vector<std::string> SchedulingNames(int8_t scheduling);
+
+/// null where it is not known.
+nlohmann::ordered_json OrNull(const std::optional<double>& value);
 
 /// Parts of summary.json: the components' latencies and counters, checks, events.
 nlohmann::ordered_json ComponentsJson(const std::map<std::string, health_t>& components);

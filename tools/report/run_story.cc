@@ -27,7 +27,7 @@ constexpr double kReferenceMoved = 5e-3;  // m, of a reference that is none to s
 
 struct Words {
   std::string_view name;
-  std::string_view words;  // {} stands for the figure, or for the event's detail
+  std::string_view words;  // {} stands for the figure
 };
 
 constexpr Words kFigure[] = {
@@ -47,13 +47,6 @@ constexpr Words kFigure[] = {
     {"torque_step_at_switch_reference", "without the ramp by {}"},
     {"foot_lift_motion_z", "the unloaded foot moved by {}"},
 };
-
-template <size_t N>
-const Words* Find(const Words (&list)[N], std::string_view name) {
-  const auto found =
-      std::find_if(list, list + N, [&](const Words& words) { return words.name == name; });
-  return found == list + N ? nullptr : found;
-}
 
 std::string Seconds(double time) { return fmt::format("{:.3f} s", time); }
 
@@ -170,13 +163,6 @@ std::string Capital(std::string text) {
   return text;
 }
 
-std::string Fill(std::string_view words, const std::string& text) {
-  std::string filled(words);
-  const size_t place = filled.find("{}");
-  if (place != std::string::npos) filled.replace(place, 2, text);
-  return filled;
-}
-
 /// The COM was to go somewhere: what its error is of is then said.
 bool ComWasMoved(const RunRecord& run) {
   std::array<double, 2> least{}, most{};
@@ -196,11 +182,11 @@ bool ComWasMoved(const RunRecord& run) {
 }
 
 std::string Figure(const CheckResult& check, bool moved) {
-  const Words* const words = Find(kFigure, check.name);
+  const auto words = std::ranges::find(kFigure, check.name, &Words::name);
   const std::string measured = FormatMeasured(check);
   const std::string paper = check.paper.empty() ? "" : fmt::format("paper: {}", check.paper);
-  std::string text = words != nullptr ? Fill(words->words, measured)
-                                      : fmt::format("{}: {}", check.label, measured);
+  std::string text = words != std::end(kFigure) ? fmt::format(fmt::runtime(words->words), measured)
+                                                : fmt::format("{}: {}", check.label, measured);
   if (moved && check.name.starts_with("com_error_")) text += " of its reference";
   return paper.empty() ? text : fmt::format("{} ({})", text, paper);
 }
