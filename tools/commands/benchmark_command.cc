@@ -2,8 +2,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <optional>
 
 #include "components/framework/configuration/configuration.h"
@@ -37,15 +35,10 @@ struct BenchmarkArguments {
 
 /// What was typed.
 std::string CommandLine() {
-  std::ifstream file("/proc/self/cmdline", std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::vector<std::string> words = Split(ReadFile("/proc/self/cmdline"), '\0');
   std::string command = "poise";
-  for (size_t at = text.find('\0'); at != std::string::npos && at + 1 < text.size();) {
-    const size_t end = text.find('\0', at + 1);
-    const std::string word = text.substr(at + 1, end - at - 1);
-    command += " " + ShellWord(word);
-    at = end;
-  }
+  // The program's path comes first, and nothing behind the last zero.
+  for (size_t i = 1; i + 1 < words.size(); ++i) command += " " + ShellWord(words[i]);
   return command;
 }
 

@@ -48,7 +48,6 @@ struct MatrixOptions {
 struct Job {
   MatrixCell cell;
   std::vector<std::string> arguments;  ///< of `poise run`, the folder aside
-  std::string name;                    ///< of its folder: "SCENARIO/ABLATION"
   double work = 0;                     ///< s to be simulated
   int64_t log_size = 0;                ///< bytes, expected
   std::unique_ptr<ChildProcess> process;
@@ -77,7 +76,7 @@ Job MakeJob(const std::string& scenario, const std::string& unique_name, const s
   if (!variant.empty()) job.arguments.insert(job.arguments.end(), {"--variant", variant});
   if (!world.empty()) job.arguments.insert(job.arguments.end(), {"--world", world});
   for (const std::string& flag : ablation.flags()) job.arguments.push_back(flag);
-  job.name = fmt::format("{}/{}", unique_name, variant.empty() ? ablation.name : variant);
+  job.cell.folder = fmt::format("{}/{}", unique_name, variant.empty() ? ablation.name : variant);
   job.cell.command = "poise";
   for (const std::string& word : job.arguments) {
     if (word != "--quiet") job.cell.command += " " + ShellWord(word);
@@ -104,27 +103,27 @@ std::vector<Job> MakeJobs(const MatrixOptions& options) {
     }
     for (const Variant& variant : loaded.scenario.variant()) {
       jobs.push_back(MakeJob(scenario, name, variant.name(), Ablations().front(), options.world));
-      jobs.back().name = fmt::format("{}/{}", name, UniqueName(variant.name(), &columns));
+      jobs.back().cell.folder = fmt::format("{}/{}", name, UniqueName(variant.name(), &columns));
     }
   }
   return jobs;
 }
 
 void StartJob(const std::string& program, const fs::path& folder, Job* job) {
-  const fs::path dir = folder / job->name;
+  const fs::path dir = folder / job->cell.folder;
   fs::create_directories(dir.parent_path());
   // An earlier matrix wrote it, and a run that cannot start would leave it.
   if (fs::exists(dir / "summary.json")) fs::remove(dir / "summary.json");
   std::vector<std::string> command = {program};
   command.insert(command.end(), job->arguments.begin(), job->arguments.end());
   command.insert(command.end(), {"--force", "--out", dir.string()});
-  job->process = std::make_unique<ChildProcess>(job->name, command, dir.string() + ".log");
+  job->process = std::make_unique<ChildProcess>(job->cell.folder, command, dir.string() + ".log");
 }
 
 void FinishJob(const fs::path& folder, Job* job) {
   job->done = true;
   try {
-    ReadCellSummary(folder / job->name / "summary.json", &job->cell);
+    ReadCellSummary(folder / job->cell.folder / "summary.json", &job->cell);
   } catch (const std::exception&) {
     // Whatever it says of the missing summary, the process's own words say why.
     std::string problem = job->process->HowItEnded();
@@ -149,8 +148,8 @@ void StopJobs(const fs::path& folder, std::vector<Job>* jobs) {
   for (Job& job : *jobs) {
     if (!job.process) continue;
     job.process.reset();
-    fs::remove_all(folder / job.name, error);
-    fs::remove((folder / job.name).string() + ".log", error);
+    fs::remove_all(folder / job.cell.folder, error);
+    fs::remove((folder / job.cell.folder).string() + ".log", error);
   }
 }
 
@@ -221,28 +220,21 @@ int Matrix(const MatrixOptions& options) {
   }
   std::vector<MatrixCell> cells;
   bool good = true;
-  for (Job& job : jobs) {
-    job.cell.folder = job.name;
-    cells.push_back(std::move(job.cell));
-  }
+  for (Job& job : jobs) cells.push_back(std::move(job.cell));
   fmt::print("\n{}\n", FormatMatrix(cells));
-  for (size_t i = 0; i < cells.size(); ++i) {
-    const MatrixCell& cell = cells[i];
+  for (const MatrixCell& cell : cells) {
     if (cell.problem) {
-      fmt::print(stderr, "poise: {} could not be run: {}\n", jobs[i].name, *cell.problem);
+      fmt::print(stderr, "poise: {} could not be run: {}\n", cell.folder, *cell.problem);
     } else if (cell.must_pass && !cell.passed) {
-      fmt::print(stderr, "poise: {} failed; see poise report {}\n", jobs[i].name,
-                 (folder / jobs[i].name).string());
+      fmt::print(stderr, "poise: {} failed; see poise report {}\n", cell.folder,
+                 (folder / cell.folder).string());
     }
     good = good && !cell.problem && (cell.passed || !cell.must_pass);
   }
   WriteFile(folder / "matrix.csv", MatrixCsv(cells));
   WriteCharts(folder, MatrixCharts(cells));
-  const auto ran = std::find_if(cells.begin(), cells.end(),
-                                [](const MatrixCell& cell) { return !cell.problem; });
-  if (ran != cells.end()) {
-    PointLatestTo(folder / jobs[static_cast<size_t>(ran - cells.begin())].name);
-  }
+  const auto ran = std::ranges::find_if(cells, [](const auto& cell) { return !cell.problem; });
+  if (ran != cells.end()) PointLatestTo(folder / ran->folder);
   fmt::print("{} runs in {:.1f} s; {}, {}\n", jobs.size(), wall, (folder / "matrix.csv").string(),
              kChartsPage);
   return good ? kExitOk : kExitFailed;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <memory>
 #include <optional>
 
 #include "components/framework/configuration/configuration.h"
@@ -221,14 +220,20 @@ int Play(const ReplayOptions& options, const std::string& log) {
   return result.failed > 0 || StopSignal() != 0 ? kExitFailed : kExitOk;
 }
 
+int Replay(const ReplayOptions& options) {
+  const std::string log = FindLog(options.run).string();
+  WarnOfRunInfo(log);
+  return options.to_bus ? Play(options, log) : CompareReplay(options, log);
+}
+
 }  // namespace
 
 void AddReplayCommand(CLI::App* app, Command* command) {
-  auto options = std::make_shared<ReplayOptions>();
-  CLI::App* replay = app->add_subcommand(
-      "replay",
+  const auto [replay, options] = AddCommand<ReplayOptions>(
+      app, command, "replay",
       "feed a log's messages to the components again and compare what they give with what was "
-      "logged, bit for bit (exit code 1 when it differs)");
+      "logged, bit for bit (exit code 1 when it differs)",
+      Replay);
   replay->footer(
       "Configurations, robot and seed are those of the log. The components are those of this "
       "program, so that a changed build shows where it differs. What cannot be replayed (a program "
@@ -267,13 +272,6 @@ void AddReplayCommand(CLI::App* app, Command* command) {
             return Matches(url, kForm).empty() ? url + ": must be udpm://GROUP:PORT?ttl=TTL" : "";
           },
           ""));
-  replay->callback([options, command] {
-    *command = [options] {
-      const std::string log = FindLog(options->run).string();
-      WarnOfRunInfo(log);
-      return options->to_bus ? Play(*options, log) : CompareReplay(*options, log);
-    };
-  });
 }
 
 }  // namespace poise
