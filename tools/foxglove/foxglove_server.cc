@@ -108,7 +108,6 @@ class FoxgloveServer::Impl : public LocalServer {
   void Send(size_t topic, uint64_t time, std::string message);
   void SendTime(uint64_t time);
   int64_t dropped() const { return dropped_; }
-  size_t num_clients() const { return clients().size(); }
 
  private:
   class Client;
@@ -333,6 +332,5 @@ void FoxgloveServer::Send(size_t topic, uint64_t time, std::string message) {
 }
 void FoxgloveServer::SendTime(uint64_t time) { impl_->SendTime(time); }
 int64_t FoxgloveServer::dropped() const { return impl_->dropped(); }
-size_t FoxgloveServer::clients() const { return impl_->num_clients(); }
 
 }  // namespace poise

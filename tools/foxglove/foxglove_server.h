@@ -32,7 +32,6 @@ class FoxgloveServer {
   void SendTime(uint64_t time);
   /// Messages that clients, gone ones too, were too slow for.
   int64_t dropped() const;
-  size_t clients() const;
 
  private:
   class Impl;

@@ -31,7 +31,6 @@ class LiveFoxglove {
   /// The run has ended.
   void Finish();
   void Poll() { server_->Poll(); }
-  int64_t dropped() const { return server_->dropped(); }
 
  private:
   void Send(size_t topic, const MessageType& type, int64_t utime, std::span<const uint8_t> data);

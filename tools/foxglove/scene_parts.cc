@@ -20,18 +20,6 @@ google::protobuf::Timestamp SceneTime(int64_t utime) {
   return time;
 }
 
-void Fill(const Eigen::Vector3d& from, foxglove::Vector3* to) {
-  to->set_x(from.x());
-  to->set_y(from.y());
-  to->set_z(from.z());
-}
-
-void Fill(const Eigen::Vector3d& from, foxglove::Point3* to) {
-  to->set_x(from.x());
-  to->set_y(from.y());
-  to->set_z(from.z());
-}
-
 void Fill(const Eigen::Quaterniond& from, foxglove::Quaternion* to) {
   to->set_x(from.x());
   to->set_y(from.y());
@@ -80,10 +68,8 @@ void AddArrow(const Eigen::Vector3d& start, const Eigen::Vector3d& vector, doubl
 
 void AddSphere(const Eigen::Vector3d& centre, double diameter, const SceneColor& color,
                foxglove::SceneEntity* entity) {
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.translation() = centre;
   foxglove::SpherePrimitive* const sphere = entity->add_spheres();
-  Fill(pose, sphere->mutable_pose());
+  Fill(Eigen::Isometry3d(Eigen::Translation3d(centre)), sphere->mutable_pose());
   Fill(Eigen::Vector3d(Eigen::Vector3d::Constant(diameter)), sphere->mutable_size());
   Fill(color, sphere->mutable_color());
 }

@@ -21,8 +21,13 @@ struct SceneColor {
 
 /// `utime` in us.
 google::protobuf::Timestamp SceneTime(int64_t utime);
-void Fill(const Eigen::Vector3d& from, foxglove::Vector3* to);
-void Fill(const Eigen::Vector3d& from, foxglove::Point3* to);
+/// `To`: Vector3 or Point3.
+template <class To>
+void Fill(const Eigen::Vector3d& from, To* to) {
+  to->set_x(from.x());
+  to->set_y(from.y());
+  to->set_z(from.z());
+}
 void Fill(const Eigen::Quaterniond& from, foxglove::Quaternion* to);
 void Fill(const Eigen::Isometry3d& from, foxglove::Pose* to);
 void Fill(const SceneColor& from, foxglove::Color* to);

@@ -219,12 +219,9 @@ class Repairer {
       const auto known = key.joint.find(name);
       if (known != key.joint.end()) return known->second;
     }
-    for (const SourceJoint& joint : source_.joints) {
-      if (joint.name == name && joint.lower < joint.upper) {
-        return std::clamp(0.0, joint.lower, joint.upper);
-      }
-    }
-    return 0;
+    const SourceJoint* const joint = source_.FindJoint(name);
+    const bool ranged = joint != nullptr && joint->lower < joint->upper;
+    return ranged ? std::clamp(0.0, joint->lower, joint->upper) : 0;
   }
 
   void Lock(SourceJoint* joint, double position, std::string what, std::string done) {
@@ -247,10 +244,8 @@ class Repairer {
   }
 
   const SourceJoint* JointOf(const std::string& link) const {
-    for (const SourceJoint& joint : source_.joints) {
-      if (joint.child == link) return &joint;
-    }
-    return nullptr;
+    const auto found = std::ranges::find(source_.joints, link, &SourceJoint::child);
+    return found == source_.joints.end() ? nullptr : &*found;
   }
 
   Repair* RepairOf(const std::string& link) {
