@@ -57,10 +57,10 @@ ordered_json SubjectJson(const BenchmarkSet& set) {
                        {"engine", set.engine()}};
   ordered_json controller = {{"graph", {{"sha1", Sha1(set.graph_text())}}}};
   if (!subject.controller.empty()) controller["file"] = subject.controller;
-  if (!subject.variant.empty()) controller["variant"] = subject.variant;
-  if (!subject.drives.empty()) controller["drives"] = subject.drives;
-  controller["set"] = subject.set;
-  controller["without"] = subject.without;
+  if (!subject.changes.variant.empty()) controller["variant"] = subject.changes.variant;
+  if (!subject.changes.drives.empty()) controller["drives"] = subject.changes.drives;
+  controller["set"] = subject.changes.set;
+  controller["without"] = subject.changes.without;
   controller["modules"] = ModulesJson();
   json["controller"] = controller;
   return json;
@@ -107,7 +107,7 @@ ordered_json PartJson(const BenchmarkResult& result) {
 /// What `poise run` is to be told in the benchmark's folder, beside the sweep's own changes.
 std::string RunOf(const BenchmarkSet& set, const BenchmarkPart& part) {
   return fmt::format("set/{}_scenario.pbtxt --robot {}", part.name(),
-                     ShellWord(set.subject().robot));
+                     ShellWord(set.subject().changes.robot));
 }
 
 }  // namespace

@@ -155,7 +155,7 @@ BenchmarkSet::BenchmarkSet(const std::string& name, const BenchmarkSubject& subj
   benchmark_ = ReadSet(file);
   CheckSet(benchmark_, file);
   text_ = TextOf(benchmark_);
-  robot_ = ReadBenchmarkRobot(subject.robot);
+  robot_ = ReadBenchmarkRobot(subject.changes.robot);
   ReadController();
 }
 
@@ -181,7 +181,7 @@ void BenchmarkSet::ReadController() {
     }
     graph_beside = files.FolderOf("graph");
   }
-  for (const std::string& change : subject_.set) {
+  for (const std::string& change : subject_.changes.set) {
     CheckField("--set " + change, change.substr(0, change.find_first_of(".[=")));
   }
   std::string graph = subject_.graph;
@@ -191,12 +191,12 @@ void BenchmarkSet::ReadController() {
     graph = controller_.has_graph() ? controller_.graph() : std::string(kGraph);
   }
   if (graph.empty()) graph = kGraph;
-  if (!subject_.drives.empty() && graph != kGraph) {
+  if (!subject_.changes.drives.empty() && graph != kGraph) {
     throw ConfigError("--drives: brings a graph of its own; leave the graph out");
   }
   const Graph merged = GraphFiles(FindFile("graphs", graph, graph_beside).string()).Merged();
   graph_text_ = TextOf(merged);
-  engine_ = subject_.engine.empty() ? EngineOf(merged) : subject_.engine;
+  engine_ = subject_.changes.world.empty() ? EngineOf(merged) : subject_.changes.world;
   controller_.clear_graph();
   controller_.clear_name();
   controller_.clear_description();
@@ -205,7 +205,7 @@ void BenchmarkSet::ReadController() {
 void BenchmarkSet::Write(const fs::path& folder) const {
   fs::create_directories(folder);
   // --drives puts its own in the place of Poise's.
-  const bool own_graph = subject_.drives.empty();
+  const bool own_graph = subject_.changes.drives.empty();
   if (own_graph) WriteFile(folder / (std::string(kGraphFile) + kEnding), graph_text_);
   for (const BenchmarkPart& part : benchmark_.part()) {
     const std::string scenario_name = part.name() + "_scenario";
@@ -233,13 +233,8 @@ SweepDefinition BenchmarkSet::Definition(int i, const fs::path& folder) const {
   SweepArguments arguments;
   arguments.what = (folder / (part.name() + kEnding)).string();
   arguments.constant = robot_.constants();
-  RunChanges& changes = arguments.changes;
-  changes.robot = robot_.file;
-  changes.world = subject_.engine;
-  changes.drives = subject_.drives;
-  changes.set = subject_.set;
-  changes.without = subject_.without;
-  changes.variant = subject_.variant;
+  arguments.changes = subject_.changes;
+  arguments.changes.robot = robot_.file;
   return SweepDefinition(arguments, part.sweep().has_limit());
 }
 

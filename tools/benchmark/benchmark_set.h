@@ -13,15 +13,14 @@ namespace poise {
 
 /// Who is measured: what a user may change of a benchmark.
 struct BenchmarkSubject {
-  std::string robot = "dyros/dyros_legs";  ///< name, folder or file
-  std::string engine;                      ///< ode or mujoco; empty: the graph's
   std::string graph;  ///< name or file; empty: the controller's file's, or Poise's own
   std::string
       controller;  ///< a scenario's text with `graph` and its components' fields; empty: none
-  std::vector<std::string> set;      ///< "field.path=value", of the controller's components
-  std::vector<std::string> without;  ///< parts of the controller, as --without takes them
-  std::string variant;               ///< of the controller's file
-  std::string drives;                ///< as --drives takes them
+  /// Robot, engine (empty: the graph's), drives; and of the controller the components' fields,
+  /// parts left out, the variant of its file.
+  RunChanges changes;
+
+  BenchmarkSubject() { changes.robot = "dyros/dyros_legs"; }
 };
 
 /// A robot as it stands at the start, for a set's expressions.

@@ -155,27 +155,28 @@ void AddBenchmarkCommand(CLI::App* app, Command* command) {
       app, command, "benchmark",
       "measure how well a controller balances, by a fixed set of disturbances", RunBenchmark);
   BenchmarkSubject* const subject = &arguments->subject;
+  RunChanges* const changes = &subject->changes;
   SessionOptions* const session = &arguments->session;
   benchmark->add_option("benchmark", arguments->set, "of deploy/benchmarks, or a .pbtxt file")
       ->capture_default_str();
   benchmark
-      ->add_option("--robot", subject->robot,
+      ->add_option("--robot", changes->robot,
                    "a name (poise list robots), a robot's folder or its .pbtxt file")
       ->capture_default_str();
-  AddWorld(benchmark, &subject->engine, "the graph's");
+  AddWorld(benchmark, &changes->world, "the graph's");
   CLI::Option* const graph = benchmark->add_option(
       "--graph", subject->graph,
       "the controller's graph (poise list graphs) or a .pbtxt file; default: balance, Poise's own");
   benchmark->add_option(
       "--controller", subject->controller,
       "a scenario's .pbtxt file with nothing but `graph` and the fields of its components");
-  benchmark->add_option("--variant", subject->variant, "of the controller's file");
-  AddList(benchmark, "--set", &subject->set, "change a field of a component (poise list fields)",
+  benchmark->add_option("--variant", changes->variant, "of the controller's file");
+  AddList(benchmark, "--set", &changes->set, "change a field of a component (poise list fields)",
           "FIELD=VALUE");
-  AddList(benchmark, "--without", &subject->without, "leave out a part of Poise's controller",
+  AddList(benchmark, "--without", &changes->without, "leave out a part of Poise's controller",
           "PART")
       ->check(CLI::IsMember(RemovableParts()));
-  AddDrives(benchmark, &subject->drives)->excludes(graph);
+  AddDrives(benchmark, &changes->drives)->excludes(graph);
   AddList(benchmark, "--part", &arguments->parts, "only this part of the set, repeatable", "PART");
   benchmark->add_flag("--quick", arguments->quick,
                       "a few of the same points: minutes; --resume without it goes on to all");
