@@ -156,8 +156,7 @@ void WriteRun(const ReplayOptions& options, const std::string& log, const fs::pa
   summary.events = logging::Events(run.record);
   summary.passed = ChecksPass(run.checks);
   WriteFile(dir / "summary.json", SummaryJson(run.scenario, run.record, summary));
-  fmt::print("\n{}\n{}",
-             FormatScreen({run.scenario, run.record, run.checks, summary.events, "", {}}),
+  fmt::print("\n{}\n{}", FormatScreen({run.scenario, run.record, run.checks, summary.events, ""}),
              FormatVerdictLines(run.scenario, run.checks, "", /*below_full_table=*/false));
   WriteHtmlReport(dir / "report.html", runs);
   fmt::print("\nWhat was replayed, step by step: {}\n", FileAddress(dir / "report.html"));

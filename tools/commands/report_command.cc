@@ -63,7 +63,7 @@ int Report(const ReportOptions& options) {
       ScreenStyle().columns, 2);
   line.Begin("events");
   const std::vector<logging::Event> events = logging::Events(run.record);
-  const ShownRun shown{run.scenario, run.record, run.checks, events, "", {}};
+  const ShownRun shown{run.scenario, run.record, run.checks, events, ""};
   text += fmt::format("\n{}\n", options.full ? FormatFullScreen(shown) : FormatScreen(shown));
   line.End();
   fmt::print("{}", text);

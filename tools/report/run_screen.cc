@@ -30,9 +30,7 @@ std::string Paragraph(const std::string& text) {
 }
 
 std::string Sentences(const ShownRun& run) {
-  std::string text = Paragraph(TellRun(run.record, run.checks, run.events, run.end));
-  for (const std::string& note : run.notes) text += Paragraph(note);
-  return text;
+  return Paragraph(TellRun(run.record, run.checks, run.events, run.end));
 }
 
 struct Count {

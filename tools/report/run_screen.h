@@ -20,12 +20,10 @@ struct ShownRun {
   const std::vector<CheckResult>& checks;
   const std::vector<logging::Event>& events;
   std::string end;  ///< why it ended, where its starter knows more than the log
-  /// Paragraphs after the two sentences: what the machine did, as opposed to the controller.
-  std::vector<std::string> notes = {};
 };
 
-/// Two sentences, the notes, and the rows that the paper has a figure for (of a scenario without
-/// such: its own checks), each with its limit.
+/// Two sentences, and the rows that the paper has a figure for (of a scenario without such: its own
+/// checks), each with its limit.
 std::string FormatScreen(const ShownRun& run);
 
 /// FormatScreen with every row, the events and the assumptions.

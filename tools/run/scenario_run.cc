@@ -183,8 +183,8 @@ void ScenarioRun::PrintEnd(const logging::RunRecord& record, const RunResult& re
                record.time(record.num_ticks), (result.dir / "run.lcm").string());
     return;
   }
-  const ShownRun shown{main_.loaded.scenario, record,          summary.checks,
-                       summary.events,        outcome.message, {}};
+  const ShownRun shown{main_.loaded.scenario, record, summary.checks, summary.events,
+                       outcome.message};
   fmt::print("\n{}\n{}{}", options_.full ? FormatFullScreen(shown) : FormatScreen(shown),
              Wrapped(realtime, ScreenStyle().columns, 2),
              FormatVerdictLines(main_.loaded.scenario, summary.checks, problem, options_.full));
