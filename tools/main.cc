@@ -15,6 +15,21 @@
 #include "tools/scenario/described_components.h"
 #include "tools/scenario/registry.h"
 
+namespace poise {
+namespace {
+
+// In the order of the help.
+constexpr void (*kCommands[])(CLI::App*, Command*) = {
+    AddRunCommand,       AddMatrixCommand,    AddWorldsCommand, AddSweepCommand,  AddLimitCommand,
+    AddLadderCommand,    AddBenchmarkCommand, AddReportCommand, AddBitsCommand,   AddCompareCommand,
+    AddReplayCommand,    AddLogCommand,       AddNewCommand,    AddGraphCommand,  AddRobotCommand,
+    AddListCommand,      AddRunsCommand,      AddDoctorCommand, AddDrivesCommand, AddEstopCommand,
+    AddOperatorCommands, AddEchoCommand,      AddTopCommand,    AddViewCommand,   AddRos2Command,
+    AddShellCommand};
+
+}  // namespace
+}  // namespace poise
+
 int main(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);  // a file that grows too large is an error that is told
   poise::UsePlainStreams();
@@ -45,32 +60,7 @@ int main(int argc, char** argv) {
     });
   };
   poise::Command command;
-  poise::AddRunCommand(&app, &command);
-  poise::AddMatrixCommand(&app, &command);
-  poise::AddWorldsCommand(&app, &command);
-  poise::AddSweepCommand(&app, &command);
-  poise::AddLimitCommand(&app, &command);
-  poise::AddLadderCommand(&app, &command);
-  poise::AddBenchmarkCommand(&app, &command);
-  poise::AddReportCommand(&app, &command);
-  poise::AddBitsCommand(&app, &command);
-  poise::AddCompareCommand(&app, &command);
-  poise::AddReplayCommand(&app, &command);
-  poise::AddLogCommand(&app, &command);
-  poise::AddNewCommand(&app, &command);
-  poise::AddGraphCommand(&app, &command);
-  poise::AddRobotCommand(&app, &command);
-  poise::AddListCommand(&app, &command);
-  poise::AddRunsCommand(&app, &command);
-  poise::AddDoctorCommand(&app, &command);
-  poise::AddDrivesCommand(&app, &command);
-  poise::AddEstopCommand(&app, &command);
-  poise::AddOperatorCommands(&app, &command);
-  poise::AddEchoCommand(&app, &command);
-  poise::AddTopCommand(&app, &command);
-  poise::AddViewCommand(&app, &command);
-  poise::AddRos2Command(&app, &command);
-  poise::AddShellCommand(&app, &command);
+  for (const auto add : poise::kCommands) add(&app, &command);
   try {
     std::vector<std::string> arguments(argv + 1, argv + argc);
     if (!arguments.empty() && arguments.front() == "help") {
