@@ -38,15 +38,11 @@ void SayProblem(std::string_view problem) {
 int ExitCodeOf(const std::function<int()>& command) {
   try {
     return Flushed(command());
-  } catch (const ConfigError& error) {
-    SayProblem(error.what());
-    return kExitUsage;
-  } catch (const robot::RobotError& error) {
-    SayProblem(error.what());
-    return kExitUsage;
   } catch (const std::exception& error) {
     SayProblem(error.what());
-    return kExitFailed;
+    const bool usage = dynamic_cast<const ConfigError*>(&error) != nullptr ||
+                       dynamic_cast<const robot::RobotError*>(&error) != nullptr;
+    return usage ? kExitUsage : kExitFailed;
   }
 }
 

@@ -143,10 +143,10 @@ void AddProcesses(const RunSpec& spec, const LiveSnapshot& snapshot, std::vector
 void AddBus(const bus_status_t& bus, std::vector<ViewLine>* lines) {
   constexpr int kOperational = 8, kError = 16;
   constexpr size_t kLabel = 6;
-  lines->push_back(
-      {fmt::format("{:<6}{:<22}{:>8}{:>10}{:>10}{:>11}{:>10}{:>11}{:>11}", "SLAVE", "STATE", "603F",
-                   "EMERGENCY", "COUNT", "CLOCK ns", "RX ERR", "LOST LINK", "RECOVERED"),
-       Style::kTitle, kLabel});
+  static constexpr char kRow[] = "{:<6}{:<22}{:>8}{:>10}{:>10}{:>11}{:>10}{:>11}{:>11}";
+  lines->push_back({fmt::format(kRow, "SLAVE", "STATE", "603F", "EMERGENCY", "COUNT", "CLOCK ns",
+                                "RX ERR", "LOST LINK", "RECOVERED"),
+                    Style::kTitle, kLabel});
   for (size_t i = 0; i < bus.online.size(); ++i) {
     const int status = bus.al_status[i];
     const char* const name = (status & 15) == 1   ? "INIT"
@@ -160,8 +160,7 @@ void AddBus(const bus_status_t& bus, std::vector<ViewLine>* lines) {
     }
     const bool good = bus.online[i] != 0 && status == kOperational;
     const bool odd = bus.error_code[i] != 0 || bus.receive_errors[i] != 0;
-    lines->push_back({fmt::format("{:<6}{:<22}{:>8}{:>10}{:>10}{:>11}{:>10}{:>11}{:>11}", i, state,
-                                  fmt::format("{:04X}", bus.error_code[i]),
+    lines->push_back({fmt::format(kRow, i, state, fmt::format("{:04X}", bus.error_code[i]),
                                   fmt::format("{:04X}", bus.emergency[i]), bus.emergencies[i],
                                   bus.clock_difference[i], bus.receive_errors[i], bus.lost_links[i],
                                   bus.recoveries[i]),

@@ -44,10 +44,6 @@ fs::path FindRun(const std::string& run) {
   return path;
 }
 
-}  // namespace
-
-namespace {
-
 /// The folder of runs where the usual one cannot be written: $XDG_STATE_HOME/poise/runs, or below
 /// ~/.local/state; empty without a home.
 fs::path StateRuns() {

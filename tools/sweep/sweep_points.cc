@@ -39,17 +39,19 @@ std::vector<SweepValue> GridValues(const Variable& v) {
 
 // The checks throw ConfigError, with the field's path in the sweep.
 
+void CheckExpressionName(const std::string& field, const std::string& name) {
+  if (IsExpressionName(name)) return;
+  throw ConfigError(field, fmt::format("is '{}'; use letters, digits and _, and not the name of a "
+                                       "function or constant",
+                                       name));
+}
+
 void CheckName(const std::string& path, bool has_name, const std::string& name,
                const std::string& field) {
   if (!has_name && field.empty()) {
     throw ConfigError(path + ".field", "is missing; give a field, a name, or both");
   }
-  if (has_name && !IsExpressionName(name)) {
-    throw ConfigError(path + ".name",
-                      fmt::format("is '{}'; use letters, digits and _, and not the name of a "
-                                  "function or constant",
-                                  name));
-  }
+  if (has_name) CheckExpressionName(path + ".name", name);
   if (std::find(std::begin(kReserved), std::end(kReserved), name) != std::end(kReserved)) {
     throw ConfigError(path + ".name", fmt::format("is '{}', a column of every table", name));
   }
@@ -208,12 +210,7 @@ void CheckVariables(const Sweep& sweep, bool limit) {
   for (int i = 0; i < sweep.constant_size(); ++i) {
     const Constant& constant = sweep.constant(i);
     const std::string path = fmt::format("constant[{}].", i);
-    if (!IsExpressionName(constant.name())) {
-      throw ConfigError(path + "name",
-                        fmt::format("is '{}'; use letters, digits and _, and not the name of a "
-                                    "function or constant",
-                                    constant.name()));
-    }
+    CheckExpressionName(path + "name", constant.name());
     RequireFields(constant, {"value"}, path);
     if (!names.insert(constant.name()).second) {
       throw ConfigError(path + "name",
