@@ -6,39 +6,34 @@
 #include "components/framework/configuration/text_pattern.h"
 #include "fmt/format.h"
 #include "logging/metrics/metrics.h"
+#include "tools/cli/lists.h"
 #include "tools/reference/schemas.h"
 #include "tools/sweep/sweep_points.h"
 
 namespace poise {
 namespace {
 
-std::string Words(std::string text) {
-  std::replace(text.begin(), text.end(), '_', ' ');
-  return text;
-}
-
 /// "peak of push[0]" of "sim.push[0].peak".
 std::string WordsOfField(const std::string& field) {
   const size_t last = field.rfind('.');
-  if (last == std::string::npos) return Words(field);
+  if (last == std::string::npos) return Spaced(field);
   const size_t before = field.rfind('.', last - 1);
   const size_t begin = before == std::string::npos ? 0 : before + 1;
-  return fmt::format("{} of {}", Words(field.substr(last + 1)),
-                     Words(field.substr(begin, last - begin)));
+  return fmt::format("{} of {}", Spaced(field.substr(last + 1)),
+                     Spaced(field.substr(begin, last - begin)));
 }
 
 /// Returns the unit of a scenario's field, "sim.push[0].peak"; empty when its schema says none.
 std::string UnitOfField(const std::string& field) {
   static const std::vector<FieldEntry> fields = FieldReference(Schema::kScenario);
   const std::string path = WithReplaced(field, "\\[[0-9]+\\]", "[i]");
-  const auto known =
-      std::ranges::find_if(fields, [&](const FieldEntry& entry) { return entry.path == path; });
+  const auto known = std::ranges::find(fields, path, &FieldEntry::path);
   return known == fields.end() ? "" : known->unit;
 }
 
 template <class Quantity>
 std::string PlainNameOf(const Quantity& quantity) {
-  return quantity.has_name() ? Words(quantity.name()) : WordsOfField(quantity.field());
+  return quantity.has_name() ? Spaced(quantity.name()) : WordsOfField(quantity.field());
 }
 
 }  // namespace

@@ -55,4 +55,10 @@ inline std::string Joined(const std::vector<std::string>& parts, std::string_vie
   return text;
 }
 
+/// "step needed" of "step_needed".
+inline std::string Spaced(std::string name) {
+  std::ranges::replace(name, '_', ' ');
+  return name;
+}
+
 }  // namespace poise

@@ -271,11 +271,10 @@ int List(const ListRequest& request) {
                       s.has_paper_section() ? ", paper section " + s.paper_section() : "");
       // What a variant of the base says of itself need not be true here.
       const auto own = ReadMessage<Scenario>(file);
+      const std::vector<std::string> described = NamesOf(own.variant());
       std::string inherited;
       for (const Variant& variant : s.variant()) {
-        const bool here = std::ranges::any_of(
-            own.variant(), [&](const Variant& other) { return other.name() == variant.name(); });
-        if (!here) {
+        if (!IsAmong(variant.name(), described)) {
           inherited += (inherited.empty() ? "" : ", ") + variant.name();
           continue;
         }

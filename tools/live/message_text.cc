@@ -77,8 +77,7 @@ std::vector<NamedTable> NamedTables(const std::vector<Scalar>& fields) {
       ++i;
       continue;
     }
-    const auto same = std::ranges::find_if(
-        tables, [&](const NamedTable& other) { return other.elements == table.elements; });
+    const auto same = std::ranges::find(tables, table.elements, &NamedTable::elements);
     if (same == tables.end()) {
       table.columns.push_back(std::move(column));
       tables.push_back(std::move(table));

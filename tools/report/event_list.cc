@@ -5,6 +5,7 @@
 
 #include "fmt/format.h"
 #include "logging/events/event_spans.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/text_table.h"
 #include "tools/report/fall_story.h"
 
@@ -19,11 +20,6 @@ constexpr double kShortTurn = 0.05;  // s; a single one is one line as well
 constexpr size_t kWholeList = 60;    // lines of a list that is told whole
 constexpr size_t kFirstLines = 25;   // of a longer one
 constexpr size_t kLastLines = 15;    // likewise, of a run that did not fall
-
-std::string Spaced(std::string name) {
-  std::ranges::replace(name, '_', ' ');
-  return name;
-}
 
 /// The events with each group of short turns as one.
 std::vector<Event> Folded(const std::vector<Event>& events) {

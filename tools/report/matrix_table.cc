@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "fmt/format.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/output_style.h"
 #include "tools/cli/text_table.h"
 #include "tools/report/html_report.h"
@@ -17,10 +18,7 @@ using Json = nlohmann::ordered_json;
 constexpr char kNotJudged[] = "–";
 
 std::string ColumnTitle(const MatrixCell& cell) {
-  if (!cell.variant.empty()) return "variant " + cell.variant;
-  std::string title = cell.ablation;
-  std::replace(title.begin(), title.end(), '_', ' ');
-  return title;
+  return cell.variant.empty() ? Spaced(cell.ablation) : "variant " + cell.variant;
 }
 
 /// A metric may stand in several checks, with a label each.

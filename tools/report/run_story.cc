@@ -277,8 +277,7 @@ std::string EndReason(const RunRecord& run) {
 
 std::string TellRun(const RunRecord& run, const std::vector<CheckResult>& checks,
                     const std::vector<Event>& events, const std::string& end) {
-  const auto fall = std::find_if(events.begin(), events.end(),
-                                 [](const Event& event) { return event.name == "fall"; });
+  const auto fall = std::ranges::find(events, std::string("fall"), &Event::name);
   const double planned = run.time(run.spec.num_ticks());
   const double reached = run.time(run.num_ticks);
   const bool early = run.spec.num_ticks() > run.num_ticks;

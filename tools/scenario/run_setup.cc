@@ -128,15 +128,10 @@ void ConnectWhere(const Scenario& scenario, ComponentInstance* instance, Graph* 
     const bool wanted = IsThere(optional, scenario);
     const auto& outputs = instance->output();
     const auto& channels = graph->channel();
-    const auto channel_named = [&](const std::string& name) {
-      return std::find_if(channels.begin(), channels.end(),
-                          [&](const Channel& channel) { return channel.name() == name; });
-    };
-    const auto output = std::ranges::find_if(
-        outputs, [&](const Connection& each) { return each.port() == optional.port; });
+    const auto output = std::ranges::find(outputs, optional.port, &Connection::port);
     if (wanted && output == outputs.end()) {
       const std::string name = InCapitals(optional.port);
-      if (channel_named(name) == channels.end()) {
+      if (!IsAmong(name, NamesOf(channels))) {
         Channel* const channel = graph->add_channel();
         channel->set_name(name);
         channel->set_type(optional.type);
@@ -145,7 +140,7 @@ void ConnectWhere(const Scenario& scenario, ComponentInstance* instance, Graph* 
       connection->set_port(optional.port);
       connection->set_channel(name);
     } else if (!wanted && output != outputs.end()) {
-      const auto channel = channel_named(output->channel());
+      const auto channel = std::ranges::find(channels, output->channel(), &Channel::name);
       if (channel != channels.end()) {
         graph->mutable_channel()->DeleteSubrange(static_cast<int>(channel - channels.begin()), 1);
       }

@@ -229,8 +229,7 @@ bool RunLimits(const std::vector<int64_t>& points, SweepSession* session) {
   std::vector<PointSearch> searches;
   for (const int64_t run : points) searches.push_back({run, LimitSearch(limit), {}});
   const auto add = [&](const SweepRow& row) {
-    const auto found = std::find_if(searches.begin(), searches.end(),
-                                    [&](const PointSearch& each) { return each.run == row.run; });
+    const auto found = std::ranges::find(searches, row.run, &PointSearch::run);
     if (found != searches.end()) found->search.Add(*row.limit, row.survived());
   };
   for (const auto& [key, row] : session->rows()) add(row);

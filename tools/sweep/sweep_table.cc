@@ -169,15 +169,7 @@ std::string FormatWarnings(const SweepRows& rows) {
 
 /// "step needed, bridge state" of "step_needed+bridge_state": words, between which a cell breaks.
 std::string Words(const std::string& trouble) {
-  std::string words;
-  for (const char c : trouble) {
-    if (c == '+') {
-      words += ", ";
-    } else {
-      words += c == '_' ? ' ' : c;
-    }
-  }
-  return words.empty() ? "-" : words;
+  return trouble.empty() ? "-" : Joined(Split(Spaced(trouble), '+'), ", ");
 }
 
 }  // namespace
