@@ -128,14 +128,10 @@ const ActPort::Targets& ActPort::targets() const {
     const ComponentType* const type = Components().TypeNamed(TypeOf(graph.component(i)));
     if (type == nullptr || ActChannel(graph, i).empty()) continue;
     if (!type->traits.engine.empty()) targets.simulator = i;
-    const auto plans = [](const PortType& port) {
-      return !port.input && port.type == "support_plan_t";
-    };
-    if (std::ranges::any_of(type->ports, plans)) targets.planner = i;
-    const auto moves = [](const PortType& port) {
-      return !port.input && port.type == "task_torque_t";
-    };
-    if (std::ranges::any_of(type->ports, moves)) targets.tasks = i;
+    for (const PortType& port : type->ports) {
+      if (!port.input && port.type == "support_plan_t") targets.planner = i;
+      if (!port.input && port.type == "task_torque_t") targets.tasks = i;
+    }
   }
   const robot::RobotModel model =
       robot::LoadRobotTexts(ResourceOf(spec_, "robot").text(), ResourceOf(spec_, "urdf").text());

@@ -127,20 +127,18 @@ nlohmann::ordered_json RealtimeJson(const RunSpec& spec, const RunOutcome& outco
   const MachineVerdict machine = JudgeMachine(spec, outcome);
   if (!machine.known) return nullptr;
   const MachineLoad& load = machine.load;
-  nlohmann::ordered_json json;
-  json["cycles"] = machine.cycles;
-  json["late_cycles"] = machine.late;
-  json["latest"] = machine.latest;
-  json["skipped_ticks"] = machine.skipped;
-  json["cpus"] = load.cpus;
-  json["load"] = load.load;
-  json["runnable"] = load.runnable;
-  json["runnable_max"] = load.runnable_max;
-  json["cpu_pressure"] = OrNull(load.pressure);
-  json["crane_let_go"] = OrNull(outcome.crane_let_go);
-  json["ticks_not_followed"] = lost.ticks;
-  json["for_want_of_a_command_in_time"] = lost.late;
-  return json;
+  return {{"cycles", machine.cycles},
+          {"late_cycles", machine.late},
+          {"latest", machine.latest},
+          {"skipped_ticks", machine.skipped},
+          {"cpus", load.cpus},
+          {"load", load.load},
+          {"runnable", load.runnable},
+          {"runnable_max", load.runnable_max},
+          {"cpu_pressure", OrNull(load.pressure)},
+          {"crane_let_go", OrNull(outcome.crane_let_go)},
+          {"ticks_not_followed", lost.ticks},
+          {"for_want_of_a_command_in_time", lost.late}};
 }
 
 }  // namespace poise

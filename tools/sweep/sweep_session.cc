@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <map>
 #include <numeric>
-#include <set>
 #include <stdexcept>
 #include <thread>
 
@@ -318,8 +317,7 @@ bool SweepSession::Run(const std::function<std::optional<Request>()>& next,
   StatusLine status(options_.quiet);
   ForkedTasks tasks(options_.jobs);
   std::map<int64_t, Request> requests;
-  std::deque<Request> again;  // once more
-  std::set<int64_t> second;   // ids of those that are made once more
+  std::deque<Request> again;
   int64_t id = 0;
   bool exhausted = false;
   std::string failure;
@@ -346,7 +344,6 @@ bool SweepSession::Run(const std::function<std::optional<Request>()>& next,
       } else {
         request = again.front();
         again.pop_front();
-        second.insert(id);
       }
       requests[id] = *request;
       tasks.Start(id++, [this, request](TaskStatus* shown) {
@@ -365,26 +362,23 @@ bool SweepSession::Run(const std::function<std::optional<Request>()>& next,
     }
     if (tasks.running() == 0 && ((exhausted && again.empty()) || !failure.empty())) break;
     for (const ForkedTasks::Result& result : tasks.Wait(kPoll)) {
-      const Request& request = requests.at(result.id);
+      const Request request = requests.extract(result.id).mapped();
       if (!result.answer && !result.crashed && !result.hung) {
         failure = fmt::format("run {}: {}", request.run, result.problem);
         continue;
       }
       const SweepRow row = RowOf(request, result);
-      if (!row.survived() && row.outcome != kInvalid && !second.contains(result.id)) {
-        again.push_back(request);
+      if (!row.survived() && row.outcome != kInvalid && !request.again) {
+        again.push_back({request.run, request.limit, /*again=*/true});
         status.Clear();
         fmt::print(stderr, "poise: run {}{}: {}; it is made once more\n", row.run,
                    row.limit ? fmt::format(" at {}", *row.limit) : "",
                    logging::LinesForTerminal(row.Ending()));
-        requests.erase(result.id);
         continue;
       }
       writer_->Append(row);
       AddRow(row, kResultsFile, &rows_);
       done(row);
-      requests.erase(result.id);
-      second.erase(result.id);
     }
     const double wall = static_cast<double>(NowNanoseconds() - start) * 1e-9;
     if (status.Due(wall)) {

@@ -57,6 +57,7 @@ class SweepSession {
   struct Request {
     int64_t run = 0;
     std::optional<double> limit;
+    bool again = false;  ///< it is made once more
   };
   struct Progress {
     double done = 0, total = 1;  ///< runs
