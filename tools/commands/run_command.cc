@@ -58,78 +58,56 @@ void AddRunCommand(CLI::App* app, Command* command) {
   run->add_option("--out", arguments->out,
                   "folder of the run (of several: holds a folder each), new or empty; default: a "
                   "dated one under runs/");
-  CLI::Option* in_process = run->add_flag("--inline", options->in_process,
-                                          "the same graph inside one process, without the network");
+  run->add_flag("--inline", options->in_process,
+                "the same graph inside one process, without the network");
   run->add_flag("--count-allocations", arguments->count_allocations,
-                "tell how often each stage allocates memory, which none should in a tick")
-      ->needs(in_process);
-  CLI::Option* const interactive =
-      run->add_flag("--interactive", arguments->interactive,
-                    "in one process at wall speed with a page in control: push, change settings, "
-                    "pause, single ticks, slow motion, back; Ctrl-C ends")
-          ->excludes(in_process);
+                "tell how often each stage allocates memory, which none should in a tick");
+  run->add_flag("--interactive", arguments->interactive,
+                "in one process at wall speed with a page in control: push, change settings, "
+                "pause, single ticks, slow motion, back; Ctrl-C ends");
   run->add_option("--port", arguments->page.port, "of that page, on 127.0.0.1; default: a free one")
-      ->check(CLI::Range(1, 65535))
-      ->needs(interactive);
+      ->check(CLI::Range(1, 65535));
   run->add_flag("--hosted", options->changes.hosted,
                 "the whole controller in one process: what the graph marks restart: true passes "
-                "its messages in memory, and sends them to all others as ever")
-      ->excludes(in_process)
-      ->excludes(interactive);
+                "its messages in memory, and sends them to all others as ever");
   AddList(run, "--host", &options->changes.host,
-          "put these components of the graph into one process of that name", "PROCESS=A,B,...")
-      ->excludes(in_process)
-      ->excludes(interactive);
-  CLI::Option* const realtime = run->add_flag("--realtime", options->changes.realtime,
-                                              "the bridge owns the clock and holds the last "
-                                              "command; processes that die are replaced. "
-                                              "With --inline: pace the ticks with the wall clock")
-                                    ->excludes(interactive);
+          "put these components of the graph into one process of that name", "PROCESS=A,B,...");
+  run->add_flag("--realtime", options->changes.realtime,
+                "the bridge owns the clock and holds the last "
+                "command; processes that die are replaced. "
+                "With --inline: pace the ticks with the wall clock");
   run->add_option(
          "--kill", options->launch.kills.count,
          "faults to inject: as often a controller process is killed, or stopped for 100 ms")
-      ->check(Within("in [1, 10000]", [](double n) { return n >= 1 && n <= 10000; }))
-      ->needs(realtime)
-      ->excludes(in_process);
+      ->check(Within("in [1, 10000]", [](double n) { return n >= 1 && n <= 10000; }));
   run->add_option("--priority", options->changes.priority,
                   "of the bridge under SCHED_FIFO, where the system grants it (default 40); 0: the "
                   "ordinary scheduler")
-      ->check(CLI::Range(0, 98))
-      ->needs(realtime);
+      ->check(CLI::Range(0, 98));
   run->add_option("--cpu", options->changes.cpu,
                   "that the controller is pinned to under SCHED_FIFO; default: the last one")
-      ->check(CLI::Range(0, 1023))
-      ->needs(realtime);
+      ->check(CLI::Range(0, 1023));
   KillOptions* const kills = &options->launch.kills;
   run->add_option("--kill-seed", kills->seed, "of the moments and processes of --kill")
       ->check(Whole())
       ->capture_default_str();
   run->add_option("--kill-from", kills->from,
                   "first time of a fault, s of the scenario; negative: while the robot starts")
-      ->capture_default_str()
-      ->needs(realtime);
+      ->capture_default_str();
   run->add_option("--kill-until", kills->until,
-                  "last time of a fault, s of the scenario (default: its end)")
-      ->needs(realtime);
-  CLI::Option* drives =
-      run->add_option(
-             "--drives", options->changes.drives,
-             "what moves the simulated robot's motors; ethercat: an emulated chain of "
-             "servo drives, through real EtherCAT frames; unitree: an emulated G1 or H1-2, "
-             "over DDS")
-          ->check(CLI::IsMember(EmulatedDrives()))
-          ->excludes(in_process)
-          ->excludes(interactive);
+                  "last time of a fault, s of the scenario (default: its end)");
+  run->add_option("--drives", options->changes.drives,
+                  "what moves the simulated robot's motors; ethercat: an emulated chain of "
+                  "servo drives, through real EtherCAT frames; unitree: an emulated G1 or H1-2, "
+                  "over DDS")
+      ->check(CLI::IsMember(EmulatedDrives()));
   run->add_option("--link", options->changes.link,
                   "of EtherCAT: udp (default), or raw:MASTER,DRIVES, two network interfaces; see "
-                  "deploy/veth")
-      ->needs(drives);
+                  "deploy/veth");
   run->add_option("--capture", options->changes.capture,
-                  "write every EtherCAT frame to this file, for Wireshark")
-      ->needs(drives);
+                  "write every EtherCAT frame to this file, for Wireshark");
   run->add_flag("--ros2", options->ros2,
-                "tell ROS 2 of the run over DDS: poise ros2 beside it, in domain ROS_DOMAIN_ID")
-      ->excludes(in_process);
+                "tell ROS 2 of the run over DDS: poise ros2 beside it, in domain ROS_DOMAIN_ID");
   AddChangeOptions(run, &options->changes,
                    "change a field of the scenario, e.g. --set sim.push[0].peak=120 or "
                    "--set 'check[push_peak].at_most=200' (poise list fields); "
@@ -143,22 +121,31 @@ void AddRunCommand(CLI::App* app, Command* command) {
   run->add_option("--seed", options->changes.seed, "of all noise")->check(Whole());
   run->add_option("--drop", options->changes.drop_rate,
                   "share of the messages that each process drops, to test the recovery")
-      ->check(Within("in [0, 0.9]", [](double share) { return share >= 0 && share <= 0.9; }))
-      ->excludes(in_process)
-      ->excludes(interactive);
+      ->check(Within("in [0, 0.9]", [](double share) { return share >= 0 && share <= 0.9; }));
   run->add_flag(
-         "!--no-log", options->launch.log,
-         "write no log, for a run of hours: nothing is checked but that it stands to the end")
-      ->excludes(in_process)
-      ->excludes(interactive);
+      "!--no-log", options->launch.log,
+      "write no log, for a run of hours: nothing is checked but that it stands to the end");
   run->add_flag("--force", options->force,
                 "replace the run that --out holds, or the file of --capture; start though the log "
                 "may not fit the disk");
-  CLI::Option* const quiet =
-      run->add_flag("--quiet", options->quiet, "only errors and the verdict, in one line");
-  run->add_flag("--full", options->full, "every figure, the events and the assumptions")
-      ->excludes(quiet);
-  const auto group = [app = run](const char* name, std::initializer_list<const char*> flags) {
+  run->add_flag("--quiet", options->quiet, "only errors and the verdict, in one line");
+  run->add_flag("--full", options->full, "every figure, the events and the assumptions");
+  using Flags = std::initializer_list<const char*>;
+  const auto exclude = [app = run](const char* excluded, Flags flags) {
+    for (const char* const flag : flags) app->get_option(flag)->excludes(app->get_option(excluded));
+  };
+  exclude("--quiet", {"--full"});
+  exclude("--inline", {"--interactive", "--hosted", "--host", "--kill", "--drives", "--ros2",
+                       "--drop", "--no-log"});
+  exclude("--interactive", {"--hosted", "--host", "--realtime", "--drives", "--drop", "--no-log"});
+  const auto need = [app = run](const char* needed, Flags flags) {
+    for (const char* const flag : flags) app->get_option(flag)->needs(app->get_option(needed));
+  };
+  need("--inline", {"--count-allocations"});
+  need("--interactive", {"--port"});
+  need("--realtime", {"--kill", "--priority", "--cpu", "--kill-from", "--kill-until"});
+  need("--drives", {"--link", "--capture"});
+  const auto group = [app = run](const char* name, Flags flags) {
     for (const char* const flag : flags) app->get_option(flag)->group(name);
   };
   group("What is run", {"--variant", "--without", "--ideal", "--no-reference", "--robot", "--world",
