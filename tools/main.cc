@@ -18,7 +18,7 @@
 namespace poise {
 namespace {
 
-// In the order of the help.
+// The help tells them in this order.
 constexpr void (*kCommands[])(CLI::App*, Command*) = {
     AddRunCommand,       AddMatrixCommand,    AddWorldsCommand, AddSweepCommand,  AddLimitCommand,
     AddLadderCommand,    AddBenchmarkCommand, AddReportCommand, AddBitsCommand,   AddCompareCommand,

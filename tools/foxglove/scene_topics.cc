@@ -50,7 +50,7 @@ int64_t PictureTicks(const RunSpec& spec) {
   return std::max<int64_t>(1, std::llround(1 / (kPictures * spec.tick_period())));
 }
 
-// By EventLevel.
+// Foxglove's levels stand in the order of EventLevel.
 constexpr foxglove::Log::Level kLevels[] = {foxglove::Log::INFO, foxglove::Log::WARNING,
                                             foxglove::Log::ERROR};
 

@@ -196,7 +196,7 @@ void AddChannels(const LiveSnapshot& snapshot, std::vector<ViewLine>* lines) {
       {fmt::format("{:<{}} {:>9.1f}{:>28}", "all", name, rate, Rate(bytes)), Style::kPlain, label});
 }
 
-// SGR sequences, by Style.
+// SGR sequences stand in the order of Style.
 constexpr const char* kColors[] = {"", "\x1b[7m", "\x1b[33m", "\x1b[1;31m"};
 
 }  // namespace
