@@ -3,7 +3,6 @@
 #include <gnu/libc-version.h>
 
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <set>
 
 #include "components/framework/build_info.h"

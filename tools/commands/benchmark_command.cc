@@ -1,5 +1,4 @@
 // `poise benchmark`: how well a controller balances, by a fixed set of disturbances.
-#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <optional>

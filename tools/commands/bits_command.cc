@@ -1,6 +1,5 @@
 #include <gnu/libc-version.h>
 
-#include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
