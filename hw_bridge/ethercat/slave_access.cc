@@ -340,7 +340,8 @@ void SlaveAccess::DownloadBytes(ObjectAddress object, std::span<const uint8_t> d
                                 bool complete) {
   const std::string what =
       fmt::format("writing {}{}", ethercat::Text(object), complete ? " with complete access" : "");
-  const bool expedited = data.size() <= kExpedited;
+  // An expedited transfer holds 1 to 4 bytes.
+  const bool expedited = !data.empty() && data.size() <= kExpedited;
   const size_t room = out_.size > kSdoMessage ? out_.size - kSdoMessage : 0U;
   size_t done = expedited ? data.size() : std::min(data.size(), room);
   static_cast<void>(Exchange({.command = SdoCommand::kDownloadRequest,

@@ -311,7 +311,8 @@ DerivedSignals::DerivedSignals(const RunSpec& spec, const robot::RobotModel& rob
     const MessageType& type = ChannelType(channel);
     uint32_t bit = 1;
     TickView().VisitMessages([&]<class T>(const T*&) {
-      if (std::string_view(type.name) == MessageTraits<T>::kName) {
+      // Signals follow from the others, not from themselves.
+      if (!std::is_same_v<T, signals_t> && std::string_view(type.name) == MessageTraits<T>::kName) {
         types_ |= bit;
         for (size_t i = 0; i < type.count_names.size(); ++i) {
           const size_t of = std::string_view(type.count_names[i]) == "num_feet" ? 1 : 0;

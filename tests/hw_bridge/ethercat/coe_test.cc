@@ -383,6 +383,17 @@ TEST(CoeMaster, DownloadsWhatDoesNotFitInSegments) {
   EXPECT_EQ(access.link.requests.size(), 2U);
 }
 
+// ETG.1000.6, table 29: an expedited transfer holds 1 to 4 bytes, so nothing is a normal one of 0.
+TEST(CoeMaster, DownloadsNothingAsANormalTransfer) {
+  ScriptedAccess access([](const Bytes& request) -> std::vector<Bytes> {
+    EXPECT_EQ(request[2], 0x21);
+    EXPECT_EQ(Get<uint32_t>(request, 6), 0U);
+    return {{0x00, 0x30, 0x60, 0x00, 0x2F, 0x00, 0, 0, 0, 0}};
+  });
+  access.slave.DownloadBytes({0x2F00, 0}, {});
+  EXPECT_EQ(access.link.requests.size(), 1U);
+}
+
 TEST(CoeMaster, AsksForCompleteAccess) {
   ScriptedAccess access([](const Bytes&) -> std::vector<Bytes> {
     return {{0x00, 0x30, 0x51, 0x12, 0x1C, 0x00, 0x04, 0, 0, 0, 0x01, 0x00, 0x07, 0x16}};
