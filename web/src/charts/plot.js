@@ -31,9 +31,53 @@ const padded = ([low, high]) => (high > low ? [low - 0.05 * (high - low), high +
 const SHAPES = [
   (ctx, x, y, r) => ctx.arc(x, y, r, 0, 2 * Math.PI),
   (ctx, x, y, r) => ctx.rect(x - r, y - r, 2 * r, 2 * r),
-  (ctx, x, y, r) => [[0, -1.4], [1.3, 1], [-1.3, 1]].forEach(([u, v], i) => ctx[i ? 'lineTo' : 'moveTo'](x + u * r, y + v * r)),
-  (ctx, x, y, r) => [[0, -1.5], [1.5, 0], [0, 1.5], [-1.5, 0]].forEach(([u, v], i) => ctx[i ? 'lineTo' : 'moveTo'](x + u * r, y + v * r)),
+  polygon([0, -1.4], [1.3, 1], [-1.3, 1]),
+  polygon([0, -1.5], [1.5, 0], [0, 1.5], [-1.5, 0]),
 ];
+
+function polygon(...corners) {
+  return (ctx, x, y, r) => corners.forEach(([u, v], i) => ctx[i ? 'lineTo' : 'moveTo'](x + u * r, y + v * r));
+}
+
+/** Strokes the path that `trace` makes; `width` and `dash`: canvas px. */
+function stroke(ctx, color, width, dash, trace) {
+  ctx.setLineDash(dash);
+  ctx.beginPath();
+  trace();
+  ctx.strokeStyle = color;
+  ctx.lineWidth = width;
+  ctx.stroke();
+  ctx.setLineDash([]);
+}
+
+const segment = (ctx, from, to) => {
+  ctx.moveTo(...from);
+  ctx.lineTo(...to);
+};
+
+const circle = (ctx, x, y, r) => {
+  ctx.arc(x, y, r, 0, 2 * Math.PI);
+  ctx.closePath();
+};
+
+const drawCross = (ctx, x, y, k, r = 3.5 * k) => stroke(ctx, cssColor('--failed'), 2 * k, [], () => {
+  segment(ctx, [x - r, y - r], [x + r, y + r]);
+  segment(ctx, [x - r, y + r], [x + r, y - r]);
+});
+
+const drawRing = (ctx, x, y, k) => stroke(ctx, cssColor('--ink-soft'), 2 * k, [3 * k, 2 * k], () => circle(ctx, x, y, 4 * k));
+
+const drawPaperLine = (ctx, from, to, y, k) =>
+  stroke(ctx, cssColor('--event'), 1.5 * k, [6 * k, 4 * k], () => segment(ctx, [from, y], [to, y]));
+
+/** A mark's outline, filled. */
+function drawShape(ctx, set, x, y, k, color) {
+  ctx.beginPath();
+  SHAPES[set % SHAPES.length](ctx, x, y, 3.5 * k);
+  ctx.closePath();
+  ctx.fillStyle = color;
+  ctx.fill();
+}
 
 export class Chart {
   /** `sets`: their names; `tip`: {show(lines, mark, event, kept), hide()}. */
@@ -182,11 +226,11 @@ export class Chart {
     if (chart.kind === 'points') {
       chart.series.forEach(([set, name], i) => {
         const words = [this.#many && this.sets[set], name].filter(Boolean).join(': ');
-        if (words) entries.push(entry(words, (ctx, x, y, k) => this.#shape(ctx, set, x, y, k, styleOf(`hue-${i}`).color())));
+        if (words) entries.push(entry(words, (ctx, x, y, k) => drawShape(ctx, set, x, y, k, styleOf(`hue-${i}`).color())));
       });
     } else {
       if (this.#many && chart.kind === 'cells') entries.push(plain(`in each cell, ${chart.polar ? 'clockwise' : 'left to right'}: ${this.sets.join(' | ')}`));
-      else if (this.#many) this.sets.forEach((name, set) => entries.push(entry(name, (ctx, x, y, k) => this.#shape(ctx, set, x, y, k, cssColor('--ink-soft')))));
+      else if (this.#many) this.sets.forEach((name, set) => entries.push(entry(name, (ctx, x, y, k) => drawShape(ctx, set, x, y, k, cssColor('--ink-soft')))));
       if (chart.share && chart.marks.every((m) => m.value === undefined || m.value === 0 || m.value === 1)) {
         entries.push(swatch('stands', 1), swatch('does not', 0));
       } else {
@@ -204,11 +248,11 @@ export class Chart {
       }
     }
     if (chart.paper !== undefined) {
-      entries.push(entry('the paper', (ctx, x, y, k) => this.#paperLine(ctx, x - 8 * k, x + 8 * k, y, k)));
+      entries.push(entry('the paper', (ctx, x, y, k) => drawPaperLine(ctx, x - 8 * k, x + 8 * k, y, k)));
     }
-    if (some('fell')) entries.push(entry('did not stand', (ctx, x, y, k) => this.#cross(ctx, x, y, k)));
-    if (chart.kind === 'cells' && chart.marks.some((m) => m.someFell)) entries.push(entry('some did not', (ctx, x, y, k) => this.#cross(ctx, x, y, k, 2.5)));
-    if (some('untold')) entries.push(entry('does not tell', (ctx, x, y, k) => this.#ring(ctx, x, y, k)));
+    if (some('fell')) entries.push(entry('did not stand', (ctx, x, y, k) => drawCross(ctx, x, y, k)));
+    if (chart.kind === 'cells' && chart.marks.some((m) => m.someFell)) entries.push(entry('some did not', (ctx, x, y, k) => drawCross(ctx, x, y, k, 2.5 * k)));
+    if (some('untold')) entries.push(entry('does not tell', (ctx, x, y, k) => drawRing(ctx, x, y, k)));
     return entries;
   }
 
@@ -233,52 +277,11 @@ export class Chart {
 
   // ---- Marks ----
 
-  #shape(ctx, set, x, y, k, color) {
-    ctx.beginPath();
-    SHAPES[set % SHAPES.length](ctx, x, y, 3.5 * k);
-    ctx.closePath();
-    ctx.fillStyle = color;
-    ctx.fill();
-  }
-
-  #cross(ctx, x, y, k, r = 3.5) {
-    ctx.beginPath();
-    ctx.moveTo(x - r * k, y - r * k);
-    ctx.lineTo(x + r * k, y + r * k);
-    ctx.moveTo(x - r * k, y + r * k);
-    ctx.lineTo(x + r * k, y - r * k);
-    ctx.strokeStyle = cssColor('--failed');
-    ctx.lineWidth = 2 * k;
-    ctx.stroke();
-  }
-
-  #ring(ctx, x, y, k) {
-    ctx.setLineDash([3 * k, 2 * k]);
-    ctx.beginPath();
-    ctx.arc(x, y, 4 * k, 0, 2 * Math.PI);
-    ctx.closePath();
-    ctx.strokeStyle = cssColor('--ink-soft');
-    ctx.lineWidth = 2 * k;
-    ctx.stroke();
-    ctx.setLineDash([]);
-  }
-
-  #paperLine(ctx, from, to, y, k) {
-    ctx.setLineDash([6 * k, 4 * k]);
-    ctx.beginPath();
-    ctx.moveTo(from, y);
-    ctx.lineTo(to, y);
-    ctx.strokeStyle = cssColor('--event');
-    ctx.lineWidth = 1.5 * k;
-    ctx.stroke();
-    ctx.setLineDash([]);
-  }
-
   /** A mark without a value of the scale, or with one. */
   #mark(ctx, mark, x, y, k, color) {
-    if (mark.state === 'fell') this.#cross(ctx, x, y, k);
-    else if (mark.state === 'untold') this.#ring(ctx, x, y, k);
-    else this.#shape(ctx, mark.set, x, y, k, color);
+    if (mark.state === 'fell') drawCross(ctx, x, y, k);
+    else if (mark.state === 'untold') drawRing(ctx, x, y, k);
+    else drawShape(ctx, mark.set, x, y, k, color);
     this.spots.push({mark, x, y});
   }
 
@@ -299,7 +302,7 @@ export class Chart {
 
   #drawPlaces(u, k) {
     const {ctx, bbox} = u, {chart} = this;
-    if (chart.paper !== undefined) this.#paperLine(ctx, bbox.left, bbox.left + bbox.width, u.valToPos(chart.paper, 'y', true), k);
+    if (chart.paper !== undefined) drawPaperLine(ctx, bbox.left, bbox.left + bbox.width, u.valToPos(chart.paper, 'y', true), k);
     // The rare ones, which are those of low share, on top.
     const marks = chart.kind === 'places' ? [...chart.marks].sort((a, b) => (b.value ?? Infinity) - (a.value ?? Infinity)) : chart.marks;
     const slack = 1;
@@ -314,9 +317,9 @@ export class Chart {
 
   /** What a cell without a value of the scale, or with a part of its runs, has in its middle. */
   #inCell(ctx, mark, x, y, k) {
-    if (mark.state === 'untold') this.#ring(ctx, x, y, k);
-    else if (mark.state === 'fell') this.#cross(ctx, x, y, k);
-    else if (mark.someFell) this.#cross(ctx, x, y, k, 2.5);
+    if (mark.state === 'untold') drawRing(ctx, x, y, k);
+    else if (mark.state === 'fell') drawCross(ctx, x, y, k);
+    else if (mark.someFell) drawCross(ctx, x, y, k, 2.5 * k);
   }
 
   #fill(ctx, mark) {
@@ -347,45 +350,30 @@ export class Chart {
     const center = [bbox.left + bbox.width / 2, bbox.top + bbox.height / 2];
     const place = (degrees, radius) => [center[0] - radius * Math.sin(degrees * RADIANS), center[1] - radius * Math.cos(degrees * RADIANS)];
     const rings = chart.kind === 'cells' ? this.#drawWedges(ctx, center, size, k) : [];
-    ctx.strokeStyle = cssColor('--grid');
-    ctx.lineWidth = k;
     const most = chart.share ? 1 : Math.max(rangeOf(chart.marks.map((m) => m.value))[1], 1e-12);
-    if (chart.kind !== 'cells') {
-      for (const value of ticksTo(most)) {
-        rings.push([value / most * size, formatNumber(value)]);
-        ctx.beginPath();
-        ctx.arc(...center, value / most * size, 0, 2 * Math.PI);
-        ctx.closePath();
-        ctx.stroke();
-      }
+    const lines = (trace) => stroke(ctx, cssColor('--grid'), k, [], trace);
+    for (const value of chart.kind === 'cells' ? [] : ticksTo(most)) {
+      rings.push([value / most * size, formatNumber(value)]);
+      lines(() => circle(ctx, ...center, value / most * size));
     }
     ctx.textAlign = 'center';
     ctx.textBaseline = 'middle';
     for (let degrees = 0; degrees < 360; degrees += 45) {
-      ctx.beginPath();
-      ctx.moveTo(...center);
-      ctx.lineTo(...place(degrees, size));
-      ctx.stroke();
+      lines(() => segment(ctx, center, place(degrees, size)));
       ctx.fillStyle = cssColor('--ink-soft');
       ctx.fillText(`${degrees}°`, ...place(degrees, size + 21 * k));
     }
-    if (chart.kind !== 'cells') {
-      for (const mark of chart.marks) {
-        if (mark.state !== 'value') {
-          this.#mark(ctx, mark, ...place(mark.x, size + 8 * k), k, '');
-          continue;
-        }
-        const at = place(mark.x, Math.max(0, mark.value) / most * size);
-        // Along a direction that was tried, up to what is survived; nothing leads from one direction to the next.
-        ctx.globalAlpha = 0.35;
-        ctx.beginPath();
-        ctx.moveTo(...center);
-        ctx.lineTo(...at);
-        ctx.strokeStyle = this.#color(mark);
-        ctx.stroke();
-        ctx.globalAlpha = 1;
-        this.#mark(ctx, mark, ...at, k, this.#color(mark));
+    for (const mark of chart.kind === 'cells' ? [] : chart.marks) {
+      if (mark.state !== 'value') {
+        this.#mark(ctx, mark, ...place(mark.x, size + 8 * k), k, '');
+        continue;
       }
+      const at = place(mark.x, Math.max(0, mark.value) / most * size), color = this.#color(mark);
+      // Along a direction that was tried, up to what is survived; nothing leads from one direction to the next.
+      ctx.globalAlpha = 0.35;
+      stroke(ctx, color, k, [], () => segment(ctx, center, at));
+      ctx.globalAlpha = 1;
+      this.#mark(ctx, mark, ...at, k, color);
     }
     ctx.textAlign = 'left';
     let free = Infinity;
