@@ -1,5 +1,5 @@
 // The bar at the bottom: play, speed, scrub, zoom, and the keys.
-import {element, icon} from './dom.js';
+import {button, element, icon, onKeys, signButton} from './dom.js';
 import {SPEEDS} from './player.js';
 
 const LONG_STEP = 0.1;  // s
@@ -14,21 +14,18 @@ function track(shared) {
   const inSight = (list) => list.filter((e) => e.time >= run.start - run.period && e.time <= run.end + run.period);
   const length = Math.max(run.end - run.start, run.period);
   const share = (t) => 100 * Math.min(1, Math.max(0, (t - run.start) / length));
-  const span = (name, {from, to}) => {
-    const mark = element('span', {class: name});
-    mark.style.left = `${share(from)}%`;
-    mark.style.width = `max(2px, ${share(to) - share(from)}%)`;
-    return mark;
+  const mark = (name, {from, to}) => {
+    const result = element('span', {class: name});
+    result.style.left = `${share(from)}%`;
+    if (to !== undefined) result.style.width = `max(2px, ${share(to) - share(from)}%)`;
+    return result;
   };
   return element('div', {class: 'track', 'aria-hidden': 'true'},
-    ...phases.support.filter((p) => p.value !== 'both feet').map((p) => span('single', p)),
-    ...phases.balancing.map((p) => span('balancing', p)),
-    ...phases.missing.map((p) => span('missing', p)),
-    ...[...inSight(events), ...inSight(otherEvents)].map((e) => {
-      const mark = element('span', {class: `event${e.called ? ' second' : ''}${e.name === 'fall' ? ' fall' : ''}`});
-      mark.style.left = `${share(e.time)}%`;
-      return mark;
-    }));
+    ...phases.support.filter((p) => p.value !== 'both feet').map((p) => mark('single', p)),
+    ...phases.balancing.map((p) => mark('balancing', p)),
+    ...phases.missing.map((p) => mark('missing', p)),
+    ...inSight([...events, ...otherEvents])
+      .map((e) => mark(`event${e.called ? ' second' : ''}${e.name === 'fall' ? ' fall' : ''}`, {from: e.time})));
 }
 
 const NEAR = 0.008;  // of the bar, from the pointer to an event that it is told of
@@ -46,20 +43,19 @@ const LIVE_TEXTS = {connecting: '○ connecting', live: '● live', ended: '■ 
 
 /** Whether the run goes on; pressed: the page follows it. */
 function liveButton({player, feed}) {
-  const button = element('button', {type: 'button', id: 'live', title: 'Follow the end of the run',
-    click: () => player.setFollowing(true)});
+  const follow = button('', 'Follow the end of the run', () => player.setFollowing(true), {id: 'live'});
   const update = () => {
     const missed = feed.lost > 0 ? `, ${feed.lost} messages missed` : '';
     const [state, text] = liveText(feed);
-    button.textContent = text + missed;
-    button.dataset.state = state;
-    button.setAttribute('aria-pressed', String(player.following));
+    follow.textContent = text + missed;
+    follow.dataset.state = state;
+    follow.setAttribute('aria-pressed', String(player.following));
   };
   for (const event of ['state', 'control']) feed.addEventListener(event, update);
   player.addEventListener('state', update);
   setInterval(update, LAG_PERIOD);
   update();
-  return button;
+  return follow;
 }
 
 /** [state, words]: live only when the page is; else how far it is behind, or up to where the run is made again. */
@@ -81,9 +77,7 @@ function rowText(run, row) {
 /** Fills `host`; `shared` as for panels, `feed` when the run is live. Returns {refresh}, for a run that has grown. */
 export function playerBar(host, shared) {
   const {player, view, run} = shared;
-  const button = (text, label, action) =>
-    element('button', {type: 'button', title: label, 'aria-label': label, click: action}, text);
-  const play = button(icon('play'), 'Play or pause (space)', () => player.toggle());
+  const play = signButton(icon('play'), 'Play or pause (space)', () => player.toggle());
   play.id = 'play';
   const speed = element('select', {id: 'speed', 'aria-label': 'Speed',
     change: () => player.setSpeed(Number(speed.value))},
@@ -102,13 +96,13 @@ export function playerBar(host, shared) {
   };
   scale();
   const marks = element('div', {class: 'marks'}, track(shared));
-  host.append(shared.feed ? liveButton(shared) : '', button('|◂', 'Start (home)', () => player.seek(run.start)),
-    button('◂', 'One tick back (←)', () => player.step(-1)), play,
-    button('▸', 'One tick on (→)', () => player.step(1)), speed,
+  host.append(shared.feed ? liveButton(shared) : '', signButton('|◂', 'Start (home)', () => player.seek(run.start)),
+    signButton('◂', 'One tick back (←)', () => player.step(-1)), play,
+    signButton('▸', 'One tick on (→)', () => player.step(1)), speed,
     element('div', {class: 'scrub'}, marks, scrub), time,
-    button('−', 'Zoom the plots out (−)', () => view.zoom(ZOOM_STEP, player.time)),
-    button('+', 'Zoom the plots in at the cursor (+)', () => view.zoom(1 / ZOOM_STEP, player.time)),
-    button('all', 'Show all that the page holds in the plots (0)', () => view.reset()));
+    signButton('−', 'Zoom the plots out (−)', () => view.zoom(ZOOM_STEP, player.time)),
+    signButton('+', 'Zoom the plots in at the cursor (+)', () => view.zoom(1 / ZOOM_STEP, player.time)),
+    signButton('all', 'Show all that the page holds in the plots (0)', () => view.reset()));
   const showTime = () => {
     scrub.value = player.tick;
     if (player.tick < run.firstTick) return time.replaceChildren();  // nothing has come yet, or again
@@ -130,20 +124,13 @@ export function playerBar(host, shared) {
 
 function listenToKeys({player, view, run, feed}) {
   const long = Math.max(1, Math.round(LONG_STEP / run.period));
-  const actions = {
+  onKeys({
     ' ': () => player.toggle(), ArrowLeft: (e) => player.step(e.shiftKey ? -long : -1),
     ArrowRight: (e) => player.step(e.shiftKey ? long : 1), Home: () => player.seek(run.start),
     End: () => feed ? player.setFollowing(true) : player.seek(run.end),
     '[': () => player.changeSpeed(-1), ']': () => player.changeSpeed(1), '0': () => view.reset(),
     '+': () => view.zoom(1 / ZOOM_STEP, player.time), '=': () => view.zoom(1 / ZOOM_STEP, player.time),
     '-': () => view.zoom(ZOOM_STEP, player.time), '/': () => document.getElementById('signal-search').focus(),
-  };
-  document.addEventListener('keydown', (e) => {
-    const writing = e.target.matches('input:not([type=range], [type=checkbox]), select, textarea');
-    const pressing = e.key === ' ' && e.target.matches('button, summary, a, [type=checkbox]');
-    if (writing || pressing || e.ctrlKey || e.metaKey || e.altKey || !Object.hasOwn(actions, e.key)) return;
-    e.preventDefault();
-    actions[e.key](e);
   });
   // What the mouse has pressed does not keep the keys; what the tab key has reached does.
   const release = (e) => {

@@ -22,6 +22,27 @@ export function shape(tag, attributes = {}, ...children) {
   return result;
 }
 
+/** A button with a text or an icon; `title` stands under the mouse. */
+export const button = (text, title, click, more = {}) => element('button', {type: 'button', title, click, ...more}, text);
+
+/** A button whose text is a sign or short: its title is also what is read aloud. */
+export const signButton = (sign, title, click) => button(sign, title, click, {'aria-label': title});
+
+/** `change(on)` when it is switched. */
+export const checkbox = (label, checked, change) => element('label', {},
+  element('input', {type: 'checkbox', checked, change: (e) => change(e.target.checked)}), label);
+
+/** Does `actions` by key, but not for whoever writes, or presses what has the focus with the space bar. */
+export function onKeys(actions) {
+  document.addEventListener('keydown', (e) => {
+    const writing = e.target.matches('input:not([type=range], [type=checkbox]), select, textarea');
+    const pressing = e.key === ' ' && e.target.matches('button, summary, a, [type=checkbox]');
+    if (writing || pressing || e.ctrlKey || e.metaKey || e.altKey || !Object.hasOwn(actions, e.key)) return;
+    e.preventDefault();
+    actions[e.key](e);
+  });
+}
+
 const ICONS = {play: 'M2 1 11 6.5 2 12Z', pause: 'M2 1h3v11H2ZM8 1h3v11H8Z'};
 
 /** A sign for a button that no font need have. */

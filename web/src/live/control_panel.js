@@ -1,6 +1,6 @@
 // The panel of a page that may act: stop, walk, settings, push, and the pace of an interactive run.
 import {endText, Undo} from './control.js';
-import {element, icon} from '../dom.js';
+import {button, element, icon, onKeys} from '../dom.js';
 import {LAG_PERIOD, liveText} from '../bar.js';
 import {formatNumber, withUnit} from '../units.js';
 
@@ -13,7 +13,7 @@ const DIRECTIONS = {forward: [1, 0, 0], backward: [-1, 0, 0], left: [0, 1, 0], r
 const AXES = [['forward', 'm/s'], ['left', 'm/s'], ['turn', 'rad/s']];
 
 /** Why this run cannot do an act; '' where it may. */
-export function obstacle(what, {standing}, run) {
+function obstacle(what, {standing}, run) {
   const {walk, recovery} = run.scenario.step_planner ?? {};
   if (standing.run?.ended) return 'the run has ended: go back, or start again';
   if (['walk', 'step'].includes(what) && !walk?.enabled) return 'needs a scenario with base: "base/walking"';
@@ -30,9 +30,15 @@ function disable(control, why) {
   control.disabled = why !== '';
 }
 
-const button = (text, title, click, more = {}) => element('button', {type: 'button', title, click, ...more}, text);
+const select = (label, options, more = {}) =>
+  element('select', {'aria-label': label, ...more}, ...options.map((option) => element('option', {}, option)));
+const numberInput = (label, value, more = {}) => element('input', {type: 'number', step: 'any', min: 0, 'aria-label': label, value, ...more});
 
-function valueText({value, unit}) { return withUnit(value, unit); }
+/** `act` is called when what stands in its `parts` is to be sent. */
+const actForm = (act, ...parts) => element('form', {class: 'line', submit: (e) => {
+  e.preventDefault();
+  act();
+}}, ...parts);
 
 /** One setting: its slider asks, its value is what is in force. */
 class SettingRow {
@@ -65,7 +71,7 @@ class SettingRow {
   update() {
     const setting = this.control.setting(this.field);
     if (!setting) return;
-    this.value.textContent = valueText(setting);
+    this.value.textContent = withUnit(setting.value, setting.unit);
     const asked = this.control.waiting.findLast((act) => act.do === 'set' && act.field === this.field);
     this.asked.textContent = asked ? `asked: ${withUnit(asked.value, setting.unit)}` : '';
     const last = this.control.standing.acts.findLast((act) => act.do === 'set' && act.name === this.field);
@@ -75,35 +81,30 @@ class SettingRow {
 }
 
 function pushForm(control, robot) {
-  const body = element('select', {'aria-label': 'Body'}, ...robot.bodies.map(({name}) => element('option', {value: name}, name)));
-  const direction = element('select', {'aria-label': 'Direction'}, ...Object.keys(DIRECTIONS).map((name) => element('option', {}, name)));
-  const force = element('input', {type: 'number', min: 0, max: control.standing.push_limit, step: 'any', 'aria-label': 'Force, N',
-    value: Math.round(PUSH_SHARE * control.standing.push_limit)});
-  const duration = element('input', {type: 'number', min: 0.002, max: control.standing.push_longest ?? 1, step: 'any',
-    'aria-label': 'Duration, s', value: PUSH_DURATION});
-  return element('form', {class: 'line', submit: (e) => {
-    e.preventDefault();
-    control.act('push', {body: body.value, point: [0, 0, 0], duration: Number(duration.value),
-      force: DIRECTIONS[direction.value].map((x) => x * Number(force.value))});
-  }}, body, direction, force, 'N', duration, 's', element('button', {id: 'push'}, 'Push'));
+  const {push_limit: limit, push_longest: longest = 1} = control.standing;
+  const body = select('Body', robot.bodies.map(({name}) => name));
+  const direction = select('Direction', Object.keys(DIRECTIONS));
+  const force = numberInput('Force, N', Math.round(PUSH_SHARE * limit), {max: limit});
+  const duration = numberInput('Duration, s', PUSH_DURATION, {min: 0.002, max: longest});
+  return actForm(() => control.act('push', {body: body.value, point: [0, 0, 0], duration: Number(duration.value),
+    force: DIRECTIONS[direction.value].map((x) => x * Number(force.value))}),
+  body, direction, force, 'N', duration, 's', element('button', {id: 'push'}, 'Push'));
 }
 
 /** Sends a joint that no leg needs to an angle. */
 function moveForm(control) {
   const joints = control.standing.movable;
-  const joint = element('select', {'aria-label': 'Joint', change: () => show()}, ...joints.map((j) => element('option', {}, j.joint)));
-  const angle = element('input', {type: 'number', step: 'any', value: 0, 'aria-label': 'Angle, rad'});
-  const duration = element('input', {type: 'number', min: 0, step: 'any', value: MOVE_DURATION, 'aria-label': 'Duration, s'});
+  const joint = select('Joint', joints.map((j) => j.joint), {change: () => show()});
+  const angle = numberInput('Angle, rad', 0);
+  const duration = numberInput('Duration, s', MOVE_DURATION);
   const show = () => {
     const {low, high} = joints[joint.selectedIndex];
     Object.assign(angle, {min: low, max: high, title: `${formatNumber(low)} to ${formatNumber(high)} rad`});
     angle.value = Math.min(high, Math.max(low, Number(angle.value)));
   };
   show();
-  return element('form', {class: 'line', submit: (e) => {
-    e.preventDefault();
-    control.act('move', {joint: joint.value, value: Number(angle.value), duration: Number(duration.value)});
-  }}, joint, angle, 'rad', duration, 's', element('button', {id: 'move'}, 'Move'));
+  return actForm(() => control.act('move', {joint: joint.value, value: Number(angle.value), duration: Number(duration.value)}),
+    joint, angle, 'rad', duration, 's', element('button', {id: 'move'}, 'Move'));
 }
 
 /** Pad, sliders and buttons of a walk, and single steps; what this run cannot do is grey, and says why. */
@@ -155,9 +156,8 @@ function walking(control, run) {
 function pace(control, player, run) {
   const go = button('', '', () => control.act(control.standing.run.paused ? 'go' : 'pause'), {id: 'go'});
   const tick = button('one tick', 'Run one tick (.)', () => control.act('tick', {ticks: 1}), {id: 'one-tick'});
-  const speed = element('select', {id: 'run-speed', 'aria-label': 'Speed of the run', change: () => {
-    control.act('speed', {value: Number(speed.value)});
-  }}, ...SPEEDS.map((s) => element('option', {value: s}, `${s}×`)));
+  const speed = element('select', {id: 'run-speed', 'aria-label': 'Speed of the run',
+    change: () => control.act('speed', {value: Number(speed.value)})}, ...SPEEDS.map((s) => element('option', {value: s}, `${s}×`)));
   const back = button('back to the cursor', 'Back to the tick at the time cursor, and on from there',
     () => control.act('back', {ticks: player.tick}), {id: 'back'});
   const again = button('start again', 'The run begins anew, with the settings that it began with, and goes on; what was is kept as a branch',
@@ -263,17 +263,11 @@ export function controlPanel(control, shared) {
     built = kind;
     update();
   });
-  const keys = {
+  control.addEventListener('change', () => onKeys({
     e: () => control.can('stop') && control.act('stop'), u: () => undo.undo(),
     p: () => control.can('pause') && control.act(control.standing.run.paused ? 'go' : 'pause'),
     '.': () => control.can('tick') && control.act('tick', {ticks: 1}),
-  };
-  document.addEventListener('keydown', (e) => {
-    const writing = e.target.matches('input:not([type=range], [type=checkbox]), select, textarea');
-    if (!control.standing || writing || e.ctrlKey || e.metaKey || e.altKey || !Object.hasOwn(keys, e.key)) return;
-    e.preventDefault();
-    keys[e.key]();
-  });
+  }), {once: true});  // a page that only looks has no such keys
   return {element: host, settings, stop: stopHost};
 }
 

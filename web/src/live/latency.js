@@ -1,5 +1,5 @@
 // How long each component took: a histogram on a logarithmic axis, and its counters.
-import {element, saveFile, shape, table} from '../dom.js';
+import {element, saveFile, shape, signButton, table} from '../dom.js';
 import {pngFile, quoted} from '../export.js';
 import {formatNumber} from '../units.js';
 
@@ -10,14 +10,14 @@ const us = (value) => value >= 1000 ? `${formatNumber(value / 1000)} ms` : `${fo
 const timed = (components) => components.filter((c) => c.latency_us.histogram?.length > 0);
 
 /** Rows component, from (µs), to (µs), count. */
-export function latencyCsv(components) {
+function latencyCsv(components) {
   const rows = timed(components).flatMap(({name, latency_us: {histogram}}) =>
     histogram.map(({from, to, count}) => [quoted(name), from, to, count].join(',')));
   return ['component,from (us),to (us),count', ...rows].join('\r\n') + '\r\n';
 }
 
 /** Where the axis, which all components share, begins and ends, and its decades; µs. */
-export function latencyAxis(components) {
+function latencyAxis(components) {
   const bins = components.flatMap((c) => c.latency_us.histogram);
   const from = Math.min(...bins.map((bin) => bin.from)), to = Math.max(...bins.map((bin) => bin.to));
   const decades = [];
@@ -60,15 +60,13 @@ export function latencyFigure(components) {
   const shown = timed(components);
   if (shown.length === 0) return '';
   const svg = picture(shown);
-  const button = (text, label, click) =>
-    element('button', {type: 'button', title: label, 'aria-label': label, click}, text);
   const saveCsv = () => saveFile('latency.csv', new Blob([latencyCsv(shown)], {type: 'text/csv'}));
   const savePng = async () => saveFile('latency.png', await pngFile(svg));
   return element('section', {class: 'table'},
     element('header', {class: 'panel-head'},
       element('h2', {}, 'Latency of each stage, from its last input to its outputs sent'),
-      element('span', {class: 'panel-buttons'}, button('CSV', 'Save the latencies as CSV', saveCsv),
-        button('PNG', 'Save the latencies as PNG', savePng))),
+      element('span', {class: 'panel-buttons'}, signButton('CSV', 'Save the latencies as CSV', saveCsv),
+        signButton('PNG', 'Save the latencies as PNG', savePng))),
     svg, element('p', {class: 'note'}, 'Both axes logarithmic: time, and how often. Lines: median, 99th percentile '
       + '(dashed), largest (dotted).'));
 }
