@@ -1,9 +1,9 @@
 // Builds the page from the run that it holds.
 import {KEYS, playerBar} from './bar.js';
-import {Control, Hand} from './live/control.js';
+import {Control} from './live/control.js';
 import {CONTROL_KEYS, controlPanel} from './live/control_panel.js';
 import {embeddedRuns} from './data.js';
-import {element, saveNamed} from './dom.js';
+import {checkbox, element, saveNamed} from './dom.js';
 import {changesOf, figuresFor, measuredName} from './figures.js';
 import {FOOTSTEPS} from './footsteps.js';
 import {grabbing} from './live/grab.js';
@@ -11,11 +11,12 @@ import {linkButton} from './link.js';
 import {LiveFeed, firstTicks, followGrowth, showEnd} from './live/live.js';
 import {NoPicture, has3D} from './no_picture.js';
 import {findPhases} from './phases.js';
+import {COLORS} from './palette.js';
 import {Player} from './player.js';
 import {PanelGrid, TimeView} from './plots.js';
 import {Printer} from './print.js';
 import {robotPage} from './robot_page.js';
-import {COLORS, SceneView} from './picture/scene.js';
+import {SceneView} from './picture/scene.js';
 import {signalSearch} from './search.js';
 import {EventList, Readout, storyText} from './side.js';
 import {TRACE} from './steps_view.js';
@@ -76,18 +77,14 @@ function header(runs, feed, player) {
 }
 
 function sceneToolbar(scene) {
-  const button = (name) => element('button', {type: 'button', click: () => scene.look(name)}, name);
-  const box = (name, label) => element('label', {}, element('input', {type: 'checkbox', checked: scene.show[name],
-    change: (e) => scene.setShow(name, e.target.checked)}), label);
-  return element('div', {class: 'toolbar'}, ...['free', 'front', 'side', 'top'].map(button),
-    box('forces', 'forces'), box('moments', 'moments'), box('pressure', 'CoP'), box('com', 'COM'), box('steps', 'steps'));
+  const box = (name, label) => checkbox(label, scene.show[name], (on) => scene.setShow(name, on));
+  return scene.toolbar(box('forces', 'forces'), box('moments', 'moments'), box('pressure', 'CoP'), box('com', 'COM'), box('steps', 'steps'));
 }
 
 /** The picture as a file. */
 function savingToolbar(scene, {run, player}) {
-  const save = (ending) => (blob) => saveNamed(`${run.meta.run.scenario} ${player.time.toFixed(3)} s`, ending, blob);
-  return element('div', {class: 'toolbar saving'},
-    element('button', {type: 'button', title: 'Save the picture as PNG', click: () => scene.png().then(save('png'))}, 'PNG'), videoButton(scene, player, save('webm')));
+  const name = () => `${run.meta.run.scenario} ${player.time.toFixed(3)} s`;
+  return element('div', {class: 'toolbar saving'}, scene.pngButton(name), videoButton(scene, player, (blob) => saveNamed(name(), 'webm', blob)));
 }
 
 /** What the regions about the standing foot leave out. */
@@ -102,12 +99,12 @@ function regionsNote(run) {
 function sceneKey(run, others) {
   const entry = (name, symbol, text) => {
     const mark = element('span', {class: 'symbol'}, symbol);
-    mark.style.color = `light-dark(${COLORS[name].light}, ${COLORS[name].dark})`;
+    mark.style.color = `light-dark(${COLORS[name]})`;
     return element('li', {}, mark, text);
   };
   const key = element('details', {class: 'scene-key', open: WIDE.matches}, element('summary', {}, 'Signs in the picture'),
     element('ul', {class: 'key'}, entry('computed', '○↑', 'computed CoP, ground force'),
-      entry('measured', '●↑', measuredName(run)), entry('desired', '◇', 'O_d, while balancing'),
+      entry('measured-mark', '●↑', measuredName(run)), entry('desired', '◇', 'O_d, while balancing'),
       entry('limit', '╌', 'acceptable region'), entry('support', '▭', 'soles, support polygon'),
       entry('capture', '●', `capture point; ─ last ${TRACE} s; ○ step needed`),
       entry('support', '▰', 'footprints, when they came down; ╌ planned'),
@@ -200,8 +197,7 @@ async function start() {
     document.getElementById('player').prepend(acting.stop);
     followOwnActs(control, player);
     if (drawn) {
-      const {show: pull} = grabbing(scene, control, new Hand(control), () => control.can('push') && player.following && feed.state === 'live');
-      player.addEventListener('time', pull);
+      player.addEventListener('time', grabbing(scene, control, () => control.can('push') && player.following && feed.state === 'live'));
     }
     control.catchUp();
   }

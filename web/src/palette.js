@@ -1,6 +1,7 @@
-// Colours and dashes of what plots show, light and dark.
+// Colours and dashes of what plots and pictures show.
 
-const COLORS = {
+/** By role: [light, dark]. */
+export const COLORS = {
   computed: ['#1f5fd0', '#6ea8ff'], measured: ['#26272b', '#e6e6e6'], limit: ['#d11f1f', '#ff6b6b'],
   desired: ['#a11fb0', '#e58cff'], truth: ['#0f8a4b', '#3ecf8e'],
   'axis-x': ['#c2410c', '#ff9a4d'], 'axis-y': ['#0f8a4b', '#3ecf8e'], 'axis-z': ['#1f5fd0', '#6ea8ff'],
@@ -9,6 +10,9 @@ const COLORS = {
   'hue-0': ['#1f5fd0', '#6ea8ff'], 'hue-1': ['#c2410c', '#ff9a4d'], 'hue-2': ['#0f8a4b', '#3ecf8e'],
   'hue-3': ['#a11fb0', '#e58cff'], 'hue-4': ['#8a6d00', '#e6c84d'], 'hue-5': ['#0e7490', '#5fd3ea'],
   'hue-6': ['#7c2d12', '#d9a083'], 'hue-7': ['#4b5563', '#b3bdcc'],
+  // Of the picture alone.
+  'measured-mark': ['#1d1d1f', '#f2f2f2'], com: ['#0f8a4b', '#3ecf8e'], capture: ['#8a6d00', '#e6c84d'],
+  reach: ['#0e7490', '#5fd3ea'], push: ['#c2410c', '#ff9a4d'], support: ['#5b6675', '#9fb0c5'],
 };
 const HUES = 8;
 
@@ -20,6 +24,8 @@ export function setPaper(on) {
   document.documentElement.toggleAttribute('data-paper', on);
 }
 export const isDark = () => query.matches && !onPaper;
+/** The colour of a role as the page is now. */
+export const colorNow = (role) => COLORS[role][isDark() ? 1 : 0];
 export const onThemeChange = (listener) => query.addEventListener('change', listener);
 
 /** By what a line is: its dash in the first run, and in the others, of which `k` makes the dashes longer. */
@@ -28,11 +34,9 @@ const DASHES = {curve: [undefined, (k) => [3 * k, 3]], desired: [[5, 3], (k) => 
 
 /** {color(), dash, width} of a role: "computed", "foot-0-measured", "axis-x-thin", ..., in the run of this place. */
 export function styleOf(role, index = 0) {
-  const [, name, variant] = /^(.*?)(?:-(thin))?$/.exec(role);
-  const hue = /^hue-(\d+)$/.exec(name);
-  const pair = COLORS[hue ? `hue-${hue[1] % HUES}` : name] ?? COLORS.computed;
+  const name = role.replace(/-thin$/, '').replace(/\d+$/, (hue) => hue % HUES);
   const kind = name === 'limit' ? 'limit' : name === 'desired' || /^foot-.*-computed$/.test(name) ? 'desired' : 'curve';
-  return {color: () => pair[isDark() ? 1 : 0], dash: index ? DASHES[kind][1](index) : DASHES[kind][0], width: variant === 'thin' || index ? 1 : 1.5};
+  return {color: () => colorNow(name in COLORS ? name : 'computed'), dash: index ? DASHES[kind][1](index) : DASHES[kind][0], width: role.endsWith('-thin') || index ? 1 : 1.5};
 }
 
 export const cssColor = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();

@@ -1,13 +1,12 @@
 // The page of `poise robot check`: a robot standing, with its frames, joint axes and soles, and what was found of it.
-import {AxesHelper, Group, Quaternion, Vector3} from 'three';
-import {element, saveNamed, shape, table} from './dom.js';
+import {AxesHelper, Group, Vector3} from 'three';
+import {checkbox, element, shape, table} from './dom.js';
 import {Arrow, Label, Outline, mark} from './picture/markers.js';
 import {NoPicture, has3D} from './no_picture.js';
 import {isDark} from './palette.js';
-import {place} from './robot_view.js';
-import {FOOT_COLORS} from './steps_view.js';
+import {FOOT_COLORS, place} from './robot_view.js';
 import {formatNumber} from './units.js';
-import {VIEWS, View3D} from './picture/view3d.js';
+import {View3D} from './picture/view3d.js';
 
 const FRAME = 0.06;  // m, of a drawn frame's axes
 const AXIS = 0.09;   // m, of a drawn joint axis
@@ -36,18 +35,16 @@ class StillView extends View3D {
   /** A frame of each body, an arrow along each joint's axis, each sole with its corners and size. */
   #mark(robot) {
     this.robotView.object.updateMatrixWorld(true);
-    const at = new Vector3(), turn = new Quaternion(), size = new Vector3();
     robot.bodies.forEach((body, b) => {
-      this.robotView.groups[b].matrixWorld.decompose(at, turn, size);
+      const {matrixWorld} = this.robotView.groups[b];
       const frame = new AxesHelper(FRAME);
       frame.material.depthTest = false;
-      frame.position.copy(at);
-      frame.quaternion.copy(turn);
+      frame.applyMatrix4(matrixWorld);
       this.layers.frames.add(frame);
       if (!body.axis) return;
-      const axis = new Vector3(...body.axis).applyQuaternion(turn).multiplyScalar(AXIS);
+      const axis = new Vector3(...body.axis).transformDirection(matrixWorld).multiplyScalar(AXIS);
       const arrow = new Arrow(0xa11fb0, 0.004);
-      arrow.set(at.toArray(), axis.toArray());
+      arrow.set(frame.position.toArray(), axis.toArray());
       this.layers.axes.add(arrow.object);
     });
     this.labels = robot.feet.map(({body, sole, corners}, f) => {
@@ -59,7 +56,7 @@ class StillView extends View3D {
         return dot;
       }));
       const holder = new Group();
-      this.robotView.groups[body].matrixWorld.decompose(holder.position, holder.quaternion, size);
+      holder.applyMatrix4(this.robotView.groups[body].matrixWorld);
       place(drawn, sole);
       holder.add(drawn);
       this.layers.soles.add(holder, label.object);
@@ -133,11 +130,10 @@ export function robotPage(data) {
     element('span', {class: `badge ${good ? 'ok' : 'failed'}`}, good ? 'no defect was found' : `${check.defects.length} defects`));
   const drawn3d = has3D(), host = document.getElementById('scene');
   const still = drawn3d ? new StillView(host, data) : new NoPicture(host);
-  const box = (name, label) => element('label', {}, element('input', {type: 'checkbox', checked: true,
-    change: (e) => still.show(name, e.target.checked)}), label);
-  if (drawn3d) host.append(element('div', {class: 'toolbar'}, ...Object.keys(VIEWS).map((name) =>
-    element('button', {type: 'button', click: () => still.look(name)}, name)), box('frames', 'frames'), box('axes', 'joint axes'), box('soles', 'soles'),
-    element('button', {type: 'button', title: 'Save the picture as PNG', click: () => still.png().then((blob) => saveNamed(check.name, 'png', blob))}, 'PNG')));
+  const box = (name, label) => checkbox(label, true, (on) => still.show(name, on));
+  if (drawn3d) {
+    host.append(still.toolbar(box('frames', 'frames'), box('axes', 'joint axes'), box('soles', 'soles'), still.pngButton(() => check.name)));
+  }
   const [drawn, inFiles] = data.triangles;
   const notes = [data.drawn_instead, drawn < inFiles ? `Of the meshes' ${inFiles} triangles ${drawn} are drawn.` : ''].filter(Boolean);
   document.getElementById('side').append(element('h2', {}, 'Soles from above: corners x, y in mm'),

@@ -1,11 +1,13 @@
 // A robot of its file's solids and meshes; a body that lacks some gets capsules between its joints.
 import {
-  BoxGeometry, BufferGeometry, CapsuleGeometry, CylinderGeometry, DoubleSide, ExtrudeGeometry, Float32BufferAttribute, Group, Mesh,
-  MeshStandardMaterial, Quaternion, Shape, SphereGeometry, Vector2, Vector3,
+  BoxGeometry, CapsuleGeometry, CylinderGeometry, DoubleSide, ExtrudeGeometry, Group, Mesh, MeshStandardMaterial, Quaternion, Shape,
+  SphereGeometry, Vector2, Vector3,
 } from 'three';
+import {geometryOf} from './picture/markers.js';
 
 const LINK_RADIUS = 0.028;  // m, of capsules
 const SOLE_THICKNESS = 0.012;  // m
+export const FOOT_COLORS = [0x3f7fd6, 0xe08a2c];  // right, left
 const UP = new Vector3(0, 1, 0);  // axis of three's cylinders
 
 export function place(object, pose) {
@@ -16,8 +18,7 @@ export function place(object, pose) {
 
 /** Corners are whole steps within the mesh's box. */
 function meshGeometry({low, size, steps, vertices, indices}) {
-  const geometry = new BufferGeometry();
-  geometry.setAttribute('position', new Float32BufferAttribute(vertices.map((v, i) => low[i % 3] + v * size[i % 3] / steps), 3));
+  const geometry = geometryOf(vertices.map((v, i) => low[i % 3] + v * size[i % 3] / steps));
   geometry.setIndex(indices);
   geometry.computeVertexNormals();
   return geometry;
@@ -47,17 +48,17 @@ export class RobotView {
     this.robot = robot;
     this.object = new Group();
     const look = ghost ? {transparent: true, opacity: 0.3, depthWrite: false} : {roughness: 0.75, metalness: 0.05};
-    this.material = new MeshStandardMaterial({color: ghost ? 0x8a6fd0 : 0x8fa3b8, ...look});
-    this.meshMaterial = new MeshStandardMaterial({color: ghost ? 0x8a6fd0 : 0x8fa3b8, ...look, flatShading: true, side: DoubleSide});
-    this.soleMaterials = robot.feet.map((_, f) =>
-      new MeshStandardMaterial({color: ghost ? 0x8a6fd0 : [0x3f7fd6, 0xe08a2c][f], ...look}));
+    const material = (color, more) => new MeshStandardMaterial({color: ghost ? 0x8a6fd0 : color, ...look, ...more});
+    this.material = material(0x8fa3b8);
+    this.meshMaterial = material(0x8fa3b8, {flatShading: true, side: DoubleSide});
+    this.soleMaterials = robot.feet.map((_, f) => material(FOOT_COLORS[f]));
     this.groups = robot.bodies.map(() => new Group());
     robot.bodies.forEach((body, b) => {
       const parent = body.parent < 0 ? this.object : this.groups[body.parent];
       if (body.origin) place(this.groups[b], body.origin);
       parent.add(this.groups[b]);
     });
-    this.origins = robot.bodies.map((_, b) => this.groups[b].quaternion.clone());
+    this.origins = this.groups.map((group) => group.quaternion.clone());
     this.axes = robot.bodies.map((body) => body.axis && new Vector3(...body.axis));
     this.#addVisuals();
     this.#addSoles();
@@ -73,8 +74,7 @@ export class RobotView {
       this.groups[visual.body].add(mesh);
     }
     const zero = new Vector3();
-    bodies.forEach((body, b) => {
-      if (!capsules.includes(b)) return;
+    for (const b of capsules) {
       const ends = [...bodies.filter((child) => child.parent === b).map((child) => child.origin.position),
         ...feet.filter((foot) => foot.body === b).map((foot) => foot.sole.position)];
       for (const end of ends) {
@@ -82,7 +82,7 @@ export class RobotView {
         if (mesh) this.groups[b].add(mesh);
       }
       this.groups[b].add(new Mesh(new SphereGeometry(LINK_RADIUS * 1.25, 16, 12), this.material));
-    });
+    }
   }
 
   #addSoles() {

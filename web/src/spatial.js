@@ -7,6 +7,9 @@ export function rotate([w, x, y, z], [a, b, c]) {
 
 export const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
 
+/** Where a point of the frame of a pose {position, orientation} lies in the frame that the pose is of. */
+export const transform = ({position, orientation}, point) => add(position, rotate(orientation, point));
+
 /** Convex hull in x and y of points [x, y, ...], anticlockwise. */
 export function convexHull(points) {
   const sorted = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]);

@@ -7,9 +7,9 @@ import {apart, Footprints, PLANNED, REGIONS, plannedAt, plannedSignals, regionsA
 import {LABEL, Label, Outline} from './picture/markers.js';
 import {isDark} from './palette.js';
 import {Samples, vector} from './samples.js';
-import {add, rotate} from './spatial.js';
+import {FOOT_COLORS} from './robot_view.js';
+import {transform} from './spatial.js';
 
-export const FOOT_COLORS = [0x3f7fd6, 0xe08a2c];  // right, left, as the robot's soles
 const SHOWN = 60;     // footprints, the last ones
 const LABELLED = 8;   // of them
 const LIFT = 0.002;   // m above the ground
@@ -20,6 +20,12 @@ const WITHIN = [1, 0.75, 0.5];        // of the regions of 0, 1, 2 steps
 
 /** A point's place that changes in every frame. */
 const growing = (count) => new BufferAttribute(new Float32Array(3 * count), 3).setUsage(DynamicDrawUsage);
+
+/** A corner of a sole on the ground, in the world. */
+const lifted = (pose, [x, y]) => {
+  const at = transform(pose, [x, y, 0]);
+  return [at[0], at[1], at[2] + LIFT];
+};
 
 /** The soles of one foot on the ground: filled, with their edges. */
 class Prints {
@@ -39,7 +45,7 @@ class Prints {
   set(prints) {
     let face = 0, edge = 0;
     for (const {pose} of prints) {
-      const at = this.corners.map(([x, y]) => add(add(pose.position, rotate(pose.orientation, [x, y, 0])), [0, 0, LIFT]));
+      const at = this.corners.map((corner) => lifted(pose, corner));
       at.forEach((point, i) => {
         this.edge.setXYZ(edge++, ...point);
         this.edge.setXYZ(edge++, ...at[(i + 1) % at.length]);
@@ -56,7 +62,7 @@ class Prints {
 const place = new Vector3();
 
 export class StepsView {
-  /** `colored(material, name)` gives a material its colour of the theme. */
+  /** `colored(object, name)` gives what is drawn with one material its colour of the theme. */
   constructor(run, colored) {
     this.run = run;
     this.footprints = new Footprints(run);
@@ -73,19 +79,16 @@ export class StepsView {
     this.regions = WITHIN.map((opacity, steps) => {
       const outline = new Outline(0, 17, steps > 0);
       outline.material.opacity = opacity;
-      colored(outline.material, 'reach');
-      return outline;
+      return colored(outline, 'reach');
     });
     this.trail = growing(TRACE_POINTS);
-    const material = new LineBasicMaterial({depthTest: false, transparent: true, opacity: 0.8});
-    colored(material, 'capture');
-    this.trace = new Line(new BufferGeometry().setAttribute('position', this.trail), material);
+    this.trace = colored(new Line(new BufferGeometry().setAttribute('position', this.trail),
+      new LineBasicMaterial({depthTest: false, transparent: true, opacity: 0.8})), 'capture');
     this.trace.frustumCulled = false;
     this.trace.renderOrder = 10;
     this.object = new Group();
-    this.object.add(...this.prints.map((p) => p.object), ...this.labels.map((l) => l.object), ...this.planned.map((p) => p.object),
-      ...this.regions.map((r) => r.object), this.trace);
-    this.flat = [...this.prints.map((p) => p.object), ...this.planned.map((p) => p.object), ...this.regions.map((r) => r.object), this.trace];
+    this.flat = [...[...this.prints, ...this.planned, ...this.regions].map(({object}) => object), this.trace];
+    this.object.add(...this.flat, ...this.labels.map(({object}) => object));
   }
 
   async load() {
@@ -136,8 +139,8 @@ export class StepsView {
   }
 
   #sole({foot, position, yaw}) {
-    const turn = [Math.cos(yaw / 2), 0, 0, Math.sin(yaw / 2)];
-    return this.run.robot.feet[foot].corners.map(([x, y]) => add(add(position, rotate(turn, [x, y, 0])), [0, 0, LIFT]));
+    const pose = {position, orientation: [Math.cos(yaw / 2), 0, 0, Math.sin(yaw / 2)]};
+    return this.run.robot.feet[foot].corners.map((corner) => lifted(pose, corner));
   }
 
   #setTrace(row) {

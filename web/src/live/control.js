@@ -42,13 +42,9 @@ export class Control extends EventTarget {
     const act = {client: this.#client, id: this.#next++, do: what, ...more};
     const sent = this.feed.send(JSON.stringify(act));
     if (what === 'stop' || this.unsent?.do !== 'stop') this.unsent = sent ? undefined : act;
-    if (!sent) {
-      this.dispatchEvent(new Event('change'));
-      return 0;
-    }
-    if (what !== 'push') this.#waiting.set(act.id, act);  // the last push stands for those before it
+    if (sent && what !== 'push') this.#waiting.set(act.id, act);  // the last push stands for those before it
     this.dispatchEvent(new Event('change'));
-    return act.id;
+    return sent ? act.id : 0;
   }
 
   #tell(standing) {
@@ -58,7 +54,7 @@ export class Control extends EventTarget {
       if (act.client !== this.#client || act.state === 'sent' || !this.#waiting.delete(act.id)) continue;
       this.dispatchEvent(new CustomEvent('answer', {detail: act}));
     }
-    const oldest = standing.acts.filter((a) => a.client === this.#client)[0]?.id ?? 0;
+    const oldest = standing.acts.find((a) => a.client === this.#client)?.id ?? 0;
     for (const id of this.#waiting.keys()) if (id < oldest) this.#waiting.delete(id);  // told of no more
     this.dispatchEvent(new Event('change'));
   }
@@ -83,12 +79,11 @@ export class Hand {
   constructor(control) { this.control = control; }
 
   get holds() { return this.#timer !== undefined; }
-  get force() { return this.#force; }
 
   take(body, point) {
     this.letGo();
     Object.assign(this, {body, point});
-    this.#timer = setInterval(() => this.#send(), REPEAT);
+    this.#timer = setInterval(() => { if (Math.hypot(...this.#force) > 0) this.#push(HOLD); }, REPEAT);
   }
 
   pull(force) { this.#force = force; }
@@ -98,26 +93,22 @@ export class Hand {
     clearInterval(this.#timer);
     this.#timer = undefined;
     this.#force = [0, 0, 0];
-    this.control.act('push', {body: this.body, point: this.point, force: [0, 0, 0], duration: 0});
+    this.#push(0);
   }
 
-  #send() {
-    if (Math.hypot(...this.#force) > 0) {
-      this.control.act('push', {body: this.body, point: this.point, force: this.#force, duration: HOLD});
-    }
-  }
+  #push(duration) { this.control.act('push', {body: this.body, point: this.point, force: this.#force, duration}); }
 }
 
 /** Settings as they were before changes that the receivers took, newest last. */
 export class Undo {
   #stack = [];
-  #undoing = new Set();  // ids of acts
+  #undoing = 0;  // id of the act, or none
 
   constructor(control) {
     this.control = control;
     this.before = new Map();  // by field, in force
     control.addEventListener('change', () => this.#look());
-    control.addEventListener('answer', ({detail}) => { if (detail.state === 'refused') this.#undoing.delete(detail.id); });
+    control.addEventListener('answer', ({detail}) => { if (detail.state === 'refused' && detail.id === this.#undoing) this.#undoing = 0; });
   }
 
   get next() { return this.#stack.at(-1); }
@@ -127,8 +118,8 @@ export class Undo {
       const before = this.before.get(field);
       this.before.set(field, value);
       if (before === undefined || before === value) continue;
-      if (this.next && this.next.field === field && this.next.value === value && this.#undoing.size > 0) {
-        this.#undoing.clear();
+      if (this.next && this.next.field === field && this.next.value === value && this.#undoing > 0) {
+        this.#undoing = 0;
         this.#stack.pop();
       } else {
         this.#stack.push({field, value: before});
@@ -137,8 +128,7 @@ export class Undo {
   }
 
   undo() {
-    if (!this.next || this.#undoing.size > 0) return;
-    const id = this.control.act('set', this.next);
-    if (id) this.#undoing.add(id);
+    if (!this.next || this.#undoing > 0) return;
+    this.#undoing = this.control.act('set', this.next);
   }
 }

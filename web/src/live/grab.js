@@ -1,17 +1,20 @@
 // Drag on the robot: the point that was grabbed is pulled towards the cursor.
 import {Plane, Raycaster, Vector2, Vector3} from 'three';
-import {springForce} from './control.js';
+import {Hand, springForce} from './control.js';
 import {element} from '../dom.js';
 import {Arrow} from '../picture/markers.js';
 import {formatForce} from '../units.js';
-import {COLORS} from '../picture/scene.js';
-import {isDark} from '../palette.js';
+import {colorNow} from '../palette.js';
 
 const METRES_PER_NEWTON = 1 / 600;
 
-/** Lets `hand` pull the robot of `scene`; `mayPush`: whether a drag on it is one now. */
-export function grabbing(scene, control, hand, mayPush) {
-  const canvas = scene.renderer.domElement;
+/**
+ * Lets the mouse pull the robot of `scene`; `mayPush`: whether a drag on it is one now. Gives what shows the pull with the pose that is
+ * shown now.
+ */
+export function grabbing(scene, control, mayPush) {
+  const hand = new Hand(control);
+  const {canvas} = scene;
   const ray = new Raycaster();
   const plane = new Plane();
   const grabbed = new Vector3(), cursor = new Vector3(), towards = new Vector3(), local = new Vector3();
@@ -29,11 +32,8 @@ export function grabbing(scene, control, hand, mayPush) {
       scene.camera);
   };
   const bodyOf = (object) => {
-    for (let o = object; o; o = o.parent) {
-      const b = robot.groups.indexOf(o);
-      if (b >= 0) return b;
-    }
-    return -1;
+    const b = robot.groups.indexOf(object);
+    return b >= 0 || !object.parent ? b : bodyOf(object.parent);
   };
 
   const down = (event) => {
@@ -54,7 +54,7 @@ export function grabbing(scene, control, hand, mayPush) {
     canvas.setPointerCapture(pointer);
     canvas.classList.add('grabbing');
     hand.take(robot.robot.bodies[body].name, local.toArray());
-    arrow.material.color.set(COLORS.push[isDark() ? 'dark' : 'light']);
+    arrow.material.color.set(colorNow('push'));
     number.hidden = false;
     show();
   };
@@ -79,7 +79,6 @@ export function grabbing(scene, control, hand, mayPush) {
     scene.draw();
   };
 
-  /** With the pose that is shown now. */
   const show = () => {
     if (!hand.holds) return;
     grabbed.copy(local);
@@ -88,8 +87,8 @@ export function grabbing(scene, control, hand, mayPush) {
     hand.pull(force);
     arrow.set(grabbed.toArray(), force.map((f) => f * METRES_PER_NEWTON));
     const {samples, row} = scene;
-    const inForce = control.standing.push ? Math.hypot(...control.standing.push.force) : 0;
-    number.textContent = `asked ${formatForce(force)}, in force ${formatForce([inForce])}, measured ${formatForce(samples.vector('push', row))}`;
+    const inForce = control.standing.push?.force ?? [0];
+    number.textContent = `asked ${formatForce(force)}, in force ${formatForce(inForce)}, measured ${formatForce(samples.vector('push', row))}`;
     scene.draw();
   };
 
@@ -99,5 +98,5 @@ export function grabbing(scene, control, hand, mayPush) {
   for (const name of ['pointerup', 'pointercancel']) scene.host.addEventListener(name, up, {capture: true});
   addEventListener('blur', () => { if (hand.holds) release(); });
   document.addEventListener('keydown', (event) => { if (event.key === 'Escape' && hand.holds) release(); });
-  return {show, release};
+  return show;
 }

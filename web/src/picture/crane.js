@@ -1,6 +1,6 @@
 // The crane that holds the robot while it starts: its rope, and its force.
-import {BufferGeometry, Float32BufferAttribute, Group, Line, LineBasicMaterial} from 'three';
-import {Arrow} from './markers.js';
+import {Group, Line, LineBasicMaterial} from 'three';
+import {Arrow, geometryOf} from './markers.js';
 
 const ROPE = 0.9;  // m, of the rope that is drawn, upwards from the robot
 
@@ -10,9 +10,7 @@ export class CraneView {
     this.metresPerNewton = metresPerNewton;
     this.material = new LineBasicMaterial({transparent: true});
     this.arrow = new Arrow(0, 0.008);
-    const geometry = new BufferGeometry();
-    geometry.setAttribute('position', new Float32BufferAttribute([0, 0, 0, 0, 0, ROPE], 3));
-    this.rope = new Line(geometry, this.material);
+    this.rope = new Line(geometryOf([0, 0, 0, 0, 0, ROPE]), this.material);
     this.object = new Group();
     this.object.add(this.rope, this.arrow.object);
   }

@@ -1,31 +1,25 @@
 // Blocks of a field, as the simulator has them while nothing stands on them.
-import {BufferAttribute, BufferGeometry, Color, Float32BufferAttribute, LineBasicMaterial, LineSegments, Group, Mesh, MeshStandardMaterial} from 'three';
+import {Color, Float32BufferAttribute, LineBasicMaterial, LineSegments, Group, Mesh, MeshStandardMaterial} from 'three';
+import {geometryOf, prism} from './markers.js';
 
 const SOFT = new Color(0xd9b98a), STIFF = new Color(0x7b7f88);
 const DEPTH = 0.05;  // m, of the walls of a block that lies below the ground
 
 /** Share 0..1 of the way from the softest to the stiffest block, by the logarithm; 1 where all are alike. */
-export function stiffnessShare(blocks, stiffness) {
+function stiffnessShare(blocks, stiffness) {
   const all = blocks.map((block) => Math.log(block.stiffness));
   const least = Math.min(...all), most = Math.max(...all);
   return most - least < 1e-9 ? 1 : (Math.log(stiffness) - least) / (most - least);
 }
 
 /** The four corners of a block's top, anticlockwise from above. */
-export function topCorners({x: [x0, x1], y: [y0, y1], top}) {
+function topCorners({x: [x0, x1], y: [y0, y1], top}) {
   return [[x0, y0, top[0]], [x1, y0, top[1]], [x1, y1, top[2]], [x0, y1, top[3]]];
 }
 
-/** Triangles of top and walls: three points each. */
-export function blockTriangles(block) {
-  const top = topCorners(block);
+function blockTriangles(block) {
   const low = Math.min(...block.top);
-  const bottom = low > 0 ? 0 : low - DEPTH;
-  const quad = (a, b, c, d) => [a, b, c, a, c, d];
-  return [...quad(...top), ...top.flatMap((a, i) => {
-    const b = top[(i + 1) % 4];
-    return quad([a[0], a[1], bottom], [b[0], b[1], bottom], b, a);
-  })];
+  return prism(topCorners(block), low > 0 ? 0 : low - DEPTH);
 }
 
 /** {object}: all of a page's `ground`. */
@@ -41,14 +35,11 @@ export class GroundBlocks {
       }
       topCorners(block).forEach((a, i, top) => edges.push(...a, ...top[(i + 1) % 4]));
     }
-    const geometry = new BufferGeometry();
-    geometry.setAttribute('position', new Float32BufferAttribute(points, 3));
-    geometry.setAttribute('color', new BufferAttribute(new Float32Array(colors), 3));
+    const geometry = geometryOf(points).setAttribute('color', new Float32BufferAttribute(colors, 3));
     geometry.computeVertexNormals();
     this.mesh = new Mesh(geometry, new MeshStandardMaterial({vertexColors: true, roughness: 1, flatShading: true,
       polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1}));  // edges and soles lie on it
-    const outline = new BufferGeometry().setAttribute('position', new Float32BufferAttribute(edges, 3));
-    this.edges = new LineSegments(outline, new LineBasicMaterial({color: 0x5a5048}));
+    this.edges = new LineSegments(geometryOf(edges), new LineBasicMaterial({color: 0x5a5048}));
     this.object.add(this.mesh, this.edges);
   }
 }

@@ -9,6 +9,18 @@ import {BLOCK_CORNERS, blockTop} from '../spatial.js';
 const UP = new Vector3(0, 1, 0);
 const OVERLAY_ORDER = 10;
 
+/** Geometry of points, three `numbers` each. */
+export const geometryOf = (numbers) => new BufferGeometry().setAttribute('position', new Float32BufferAttribute(numbers, 3));
+
+/** Triangles, of three points each, of a top of four corners, anticlockwise from above, and of its walls down to the height `bottom`. */
+export function prism(top, bottom) {
+  const quad = (a, b, c, d) => [a, b, c, a, c, d];
+  return [...quad(...top), ...top.flatMap((a, i) => {
+    const b = top[(i + 1) % 4];
+    return quad([a[0], a[1], bottom], [b[0], b[1], bottom], b, a);
+  })];
+}
+
 /** Drawn over what lies before it: points under a sole stay in sight. */
 const overlay = (color, more = {}) =>
   new MeshBasicMaterial({color, depthTest: false, transparent: true, side: DoubleSide, ...more});
@@ -54,9 +66,7 @@ export function mark(kind, color, size) {
 function crossGeometry(size) {
   const t = 0.22 * size;
   const quad = (a, b) => [-a, -b, 0, a, -b, 0, a, b, 0, -a, -b, 0, a, b, 0, -a, b, 0];
-  const geometry = new BufferGeometry();
-  geometry.setAttribute('position', new Float32BufferAttribute([...quad(size, t), ...quad(t, size)], 3));
-  return geometry;
+  return geometryOf([...quad(size, t), ...quad(t, size)]);
 }
 
 export const LABEL = {width: 128, height: 36, size: 0.00125};  // pixels, pixels, m a pixel
@@ -122,9 +132,7 @@ export class Outline {
 export class Block {
   constructor(block) {
     this.block = block;
-    this.positions = new BufferAttribute(new Float32Array(3 * VERTICES.length), 3);
-    this.geometry = new BufferGeometry().setAttribute('position', this.positions);
-    this.object = new Mesh(this.geometry, new MeshStandardMaterial({color: 0x9c8458, roughness: 1, side: DoubleSide}));
+    this.object = new Mesh(new BufferGeometry(), new MeshStandardMaterial({color: 0x9c8458, roughness: 1, side: DoubleSide}));
     this.object.position.set(block.x, block.y, 0.001);
     this.object.visible = false;
   }
@@ -135,18 +143,10 @@ export class Block {
     this.rise = rise;
     this.object.visible = rise !== undefined;
     if (rise === undefined) return;
-    const {length, width} = this.block;
-    const top = blockTop(this.block, rise);
-    VERTICES.forEach(([corner, high], i) => this.positions.setXYZ(i, BLOCK_CORNERS[corner][0] * length / 2,
-      BLOCK_CORNERS[corner][1] * width / 2, high ? top[corner] : 0));
-    this.positions.needsUpdate = true;
-    this.geometry.computeVertexNormals();
-    this.geometry.computeBoundingSphere();
+    const {length, width} = this.block, heights = blockTop(this.block, rise);
+    const top = BLOCK_CORNERS.map(([i, j], corner) => [i * length / 2, j * width / 2, heights[corner]]);
+    this.object.geometry.dispose();
+    this.object.geometry = geometryOf(prism(top, 0).flat());
+    this.object.geometry.computeVertexNormals();
   }
 }
-const quad = (a, b, c, d) => [a, b, c, a, c, d];
-/** [corner, whether of the top] of the triangles of the top and the four sides. */
-const VERTICES = [quad([0, 1], [1, 1], [2, 1], [3, 1]), ...[0, 1, 2, 3].map((k) => {
-  const next = (k + 1) % 4;
-  return quad([k, 0], [next, 0], [next, 1], [k, 1]);
-})].flat();

@@ -6,9 +6,9 @@ import {element} from '../dom.js';
 import {GroundBlocks} from './ground.js';
 import {Arrow, Block, mark, Outline} from './markers.js';
 import {RobotView, place} from '../robot_view.js';
-import {isDark} from '../palette.js';
+import {colorNow, isDark} from '../palette.js';
 import {Samples, pose, vector} from '../samples.js';
-import {add, blockRise, convexHull, rotate} from '../spatial.js';
+import {blockRise, convexHull, rotate, transform} from '../spatial.js';
 import {StepsView} from '../steps_view.js';
 import {GRID, PIECE, View3D} from './view3d.js';
 
@@ -27,14 +27,6 @@ const GROUND_LAYER = 1;  // what the view from above shows
 const FOLLOW = 0.15;     // m that the robot goes from the middle before the view goes with it
 const CLIMB = 0.4;       // m likewise, up or down
 
-export const COLORS = {
-  computed: {light: '#1f5fd0', dark: '#6ea8ff'}, measured: {light: '#1d1d1f', dark: '#f2f2f2'},
-  limit: {light: '#d11f1f', dark: '#ff6b6b'}, com: {light: '#0f8a4b', dark: '#3ecf8e'},
-  capture: {light: '#8a6d00', dark: '#e6c84d'}, reach: {light: '#0e7490', dark: '#5fd3ea'},
-  desired: {light: '#a11fb0', dark: '#e58cff'}, push: {light: '#c2410c', dark: '#ff9a4d'},
-  support: {light: '#5b6675', dark: '#9fb0c5'},
-};
-
 /** True motion when the run has it, else the estimated one. */
 function motionSignals(run) {
   const type = run.find('ground_truth_t', 'base_position[0]') ? 'ground_truth_t' : 'robot_state_t';
@@ -47,16 +39,14 @@ function motionSignals(run) {
       : vector('com', 'planner_status_t', 'com_position'))};
 }
 
+const wrench = (kind, f, type) => ({...vector(`${kind}${f}.force`, type, `foot_wrench[${f}].force`),
+  ...vector(`${kind}${f}.moment`, type, `foot_wrench[${f}].moment`), ...vector(`${kind}${f}.cop`, DERIVED, `foot[${f}].cop_${kind}`, 2)});
+
 function contactSignals(run) {
   const truth = run.find('ground_truth_t', 'foot_pose[0].position[0]');
   return Object.assign({}, ...run.robot.feet.map((_, f) => ({
     ...pose(`sole${f}`, truth ? 'ground_truth_t' : 'planner_status_t', `foot_pose[${f}]`),
-    ...vector(`measured${f}.force`, 'robot_state_t', `foot_wrench[${f}].force`),
-    ...vector(`measured${f}.moment`, 'robot_state_t', `foot_wrench[${f}].moment`),
-    ...vector(`measured${f}.cop`, DERIVED, `foot[${f}].cop_measured`, 2),
-    ...vector(`computed${f}.force`, 'joint_command_t', `foot_wrench[${f}].force`),
-    ...vector(`computed${f}.moment`, 'joint_command_t', `foot_wrench[${f}].moment`),
-    ...vector(`computed${f}.cop`, DERIVED, `foot[${f}].cop_computed`, 2),
+    ...wrench('measured', f, 'robot_state_t'), ...wrench('computed', f, 'joint_command_t'),
     [`contact${f}`]: ['support_plan_t', `in_contact[${f}]`],
   })), pose('frame', 'balance_torque_t', 'frame_o'), vector('cop', 'balance_torque_t', 'cop', 2),
   vector('corner_x', 'balance_torque_t', 'corner_x', REGION_CORNERS),
@@ -109,30 +99,21 @@ export class SceneView extends View3D {
       this.blocks = new GroundBlocks(this.run.meta.ground);
       scene.add(this.blocks.object);
     }
-    this.colored = [];  // [material, name of COLORS]
-    const colored = (material, name) => { this.colored.push([material, name]); };
-    const flat = (kind, name, size) => {
-      const mesh = mark(kind, 0, size);
-      colored(mesh.material, name);
-      return mesh;
+    this.colored = [];  // [material, role]
+    const colored = (object, name) => {
+      this.colored.push([object.material, name]);
+      return object;
     };
-    const arrow = (name, radius) => {
-      const result = new Arrow(0, radius);
-      colored(result.material, name);
-      return result;
-    };
-    const outline = (name, count, dashed) => {
-      const result = new Outline(0, count, dashed);
-      colored(result.material, name);
-      return result;
-    };
+    const flat = (kind, name, size) => colored(mark(kind, 0, size), name);
+    const arrow = (name, radius) => colored(new Arrow(0, radius), name);
+    const outline = (name, count, dashed) => colored(new Outline(0, count, dashed), name);
     this.arrows = this.run.robot.feet.map(() => ({
-      measured: arrow('measured', 0.0055), computed: arrow('computed', 0.009),
-      measuredMoment: arrow('measured', 0.004), computedMoment: arrow('desired', 0.006)}));
+      measured: arrow('measured-mark', 0.0055), computed: arrow('computed', 0.009),
+      measuredMoment: arrow('measured-mark', 0.004), computedMoment: arrow('desired', 0.006)}));
     this.pushArrow = arrow('push', 0.012);
     this.crane = new CraneView(METRES_PER_NEWTON);
-    colored(this.crane.material, 'support');
-    colored(this.crane.arrow.material, 'push');
+    colored(this.crane, 'support');
+    colored(this.crane.arrow, 'push');
     this.soles = this.run.robot.feet.map((foot) => outline('support', foot.corners.length));
     this.polygon = outline('support', this.run.robot.feet.reduce((sum, foot) => sum + foot.corners.length, 0));
     this.region = outline('limit', REGION_CORNERS, true);
@@ -141,29 +122,24 @@ export class SceneView extends View3D {
     this.step = flat('ring', 'capture', 0.045);
     this.frame = new Group();
     this.marks = {desired: flat('diamond', 'desired', 0.024), computed: flat('ring', 'computed', 0.013),
-      measured: flat('disc', 'measured', 0.0075)};
+      measured: flat('disc', 'measured-mark', 0.0075)};
     this.frame.add(this.marks.desired, this.marks.computed);
     this.measuredFrame = new Group();
     this.marks.measured.position.z = 0.001;
     this.measuredFrame.add(this.marks.measured);
     this.comMark = flat('cross', 'com', 0.014);
-    this.com = new Mesh(new SphereGeometry(0.022, 20, 14), new MeshBasicMaterial({depthTest: false, transparent: true}));
+    this.com = colored(new Mesh(new SphereGeometry(0.022, 20, 14), new MeshBasicMaterial({depthTest: false, transparent: true})), 'com');
     this.com.renderOrder = 9;
-    colored(this.com.material, 'com');
-    scene.add(this.frame, this.measuredFrame, this.comMark, this.com, this.capture, this.step, this.polygon.object, this.region.object,
-      this.pushArrow.object, this.crane.object, this.steps.object,
-      ...this.soles.map((s) => s.object),
-      ...this.arrows.flatMap((a) => [a.computed, a.measured, a.computedMoment, a.measuredMoment].map((x) => x.object)));
-    for (const object of [this.frame, this.measuredFrame, this.comMark, this.capture, this.step, this.polygon.object, this.region.object,
-      ...this.soles.map((s) => s.object), ...this.steps.flat]) {
-      object.traverse((o) => o.layers.enable(GROUND_LAYER));
-    }
+    const flats = [this.frame, this.measuredFrame, this.comMark, this.capture, this.step, this.polygon.object, this.region.object,
+      ...this.soles.map((s) => s.object)];
+    scene.add(...flats, this.com, this.pushArrow.object, this.crane.object, this.steps.object,
+      ...this.arrows.flatMap((arrows) => Object.values(arrows).map((x) => x.object)));
+    for (const object of [...flats, ...this.steps.flat]) object.traverse((o) => o.layers.enable(GROUND_LAYER));
   }
 
   setTheme() {
-    const dark = isDark();
-    for (const [material, name] of this.colored) material.color.set(COLORS[name][dark ? 'dark' : 'light']);
-    this.insetBackground = new Color(dark ? 0x20252c : 0xffffff);
+    for (const [material, role] of this.colored) material.color.set(colorNow(role));
+    this.insetBackground = new Color(isDark() ? 0x20252c : 0xffffff);
     super.setTheme();
   }
 
@@ -178,9 +154,11 @@ export class SceneView extends View3D {
     const {samples, show} = this;
     const posed = this.robotView.setPose(samples.pose('base', row),
       samples.vector('joint', row, this.run.robot.joints.length));
-    if (posed && this.posedAt === undefined) this.look('free');  // a page may be opened before a run's first pose
-    if (posed) this.posedAt = this.run.timeAt(row);
-    if (posed) this.#follow();
+    if (posed) {
+      if (this.posedAt === undefined) this.look('free');  // a page may be opened before a run's first pose
+      this.posedAt = this.run.timeAt(row);
+      this.#follow();
+    }
     this.note.hidden = posed;
     this.note.textContent = this.posedAt === undefined ? 'no message tells the robot\'s pose'
       : `no message tells the pose at this time: it is that of ${this.posedAt.toFixed(3)} s`;
@@ -237,7 +215,7 @@ export class SceneView extends View3D {
     const polygon = [];
     this.run.robot.feet.forEach((foot, f) => {
       const sole = samples.pose(`sole${f}`, row);
-      const corners = foot.corners.map(([x, y]) => add(sole.position, rotate(sole.orientation, [x, y, 0])));
+      const corners = foot.corners.map(([x, y]) => transform(sole, [x, y, 0]));
       this.soles[f].set(show.pressure && corners.flat().every(Number.isFinite) ? corners : []);
       if (samples.at(`contact${f}`, row) > 0) polygon.push(...corners);
       for (const kind of ['measured', 'computed']) {
@@ -245,7 +223,7 @@ export class SceneView extends View3D {
         const moment = samples.vector(`${kind}${f}.moment`, row);
         // What the ground does to the robot, where it acts on the sole.
         const cop = samples.vector(`${kind}${f}.cop`, row, 2), loaded = cop.every(Number.isFinite);
-        const at = loaded ? add(sole.position, rotate(sole.orientation, [...cop, 0])) : sole.position;
+        const at = loaded ? transform(sole, [...cop, 0]) : sole.position;
         const force = rotate(sole.orientation, samples.vector(`${kind}${f}.force`, row).map((v) => -v * METRES_PER_NEWTON));
         arrows[kind].set(at, show.forces && loaded ? force : [0, 0, 0]);
         const turn = rotate(sole.orientation, moment.map((v) => -v * METRES_PER_NEWTON_METRE));
@@ -262,8 +240,8 @@ export class SceneView extends View3D {
     const known = show.pressure && [...frame.position, ...frame.orientation].every(Number.isFinite);
     this.frame.visible = known;
     const count = samples.at('num_corners', row);
-    const corners = Array.from({length: count > 0 ? count : 0}, (_, i) => add(frame.position,
-      rotate(frame.orientation, [samples.at(`corner_x[${i}]`, row), samples.at(`corner_y[${i}]`, row), 0.001])));
+    const corners = Array.from({length: count > 0 ? count : 0}, (_, i) =>
+      transform(frame, [samples.at(`corner_x[${i}]`, row), samples.at(`corner_y[${i}]`, row), 0.001]));
     this.region.set(known && corners.flat().every(Number.isFinite) ? corners : []);
     const drop = (object, name, on) => {
       const at = samples.vector(name, row);

@@ -1,11 +1,13 @@
 // A robot in 3D: what the picture of a run and that of a robot's check share.
 import {
-  AmbientLight, Box3, BufferGeometry, CircleGeometry, Color, DirectionalLight, Float32BufferAttribute, Fog, HemisphereLight,
-  LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial, PerspectiveCamera, Scene, Vector3, WebGLRenderer,
+  AmbientLight, Box3, CircleGeometry, Color, DirectionalLight, Fog, HemisphereLight, LineBasicMaterial, LineSegments, Mesh,
+  MeshBasicMaterial, PerspectiveCamera, Scene, Vector3, WebGLRenderer,
 } from 'three';
 import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
-import {isDark} from '../palette.js';
+import {button, element, saveNamed} from '../dom.js';
+import {isDark, onThemeChange} from '../palette.js';
 import {RobotView} from '../robot_view.js';
+import {geometryOf} from './markers.js';
 
 const FILL = 1.22;  // of the picture's height that the robot may take, as its inverse
 const FINEST = Math.min(2, globalThis.devicePixelRatio);  // pixels of the picture per CSS pixel
@@ -14,7 +16,7 @@ const GROUND = 6;       // m, across
 export const GRID = 0.1;  // m
 export const PIECE = 5;   // squares
 const FOG = [1.2, 4];   // m behind the robot, where the ground begins to fade and where it ends: no edge is its horizon
-export const VIEWS = {free: [0.75, -0.62, 0.28], front: [1, 0, 0.12], side: [0, -1, 0.12], top: [0, -0.001, 1]};
+const VIEWS = {free: [0.75, -0.62, 0.28], front: [1, 0, 0.12], side: [0, -1, 0.12], top: [0, -0.001, 1]};
 
 /** Squares of GRID on the ground, of short pieces: software renderers drop lines that reach behind the camera. */
 function gridGeometry() {
@@ -25,7 +27,7 @@ function gridGeometry() {
       points.push(i * GRID, k * GRID, 0, i * GRID, (k + PIECE) * GRID, 0, k * GRID, i * GRID, 0, (k + PIECE) * GRID, i * GRID, 0);
     }
   }
-  return new BufferGeometry().setAttribute('position', new Float32BufferAttribute(points, 3));
+  return geometryOf(points);
 }
 
 export class View3D {
@@ -63,7 +65,7 @@ export class View3D {
     this.setTheme();
     this.look('free');
     new ResizeObserver(() => this.#resize()).observe(this.host);
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.setTheme());
+    onThemeChange(() => this.setTheme());
   }
 
   setTheme() {
@@ -82,6 +84,16 @@ export class View3D {
     this.camera.position.set(...VIEWS[name]).normalize().multiplyScalar(distance + size.x / 2).add(this.controls.target);
     this.controls.update();
     this.draw();
+  }
+
+  /** A button for each of VIEWS, and `more`. */
+  toolbar(...more) {
+    return element('div', {class: 'toolbar'}, ...Object.keys(VIEWS).map((name) => button(name, null, () => this.look(name))), ...more);
+  }
+
+  /** Saves the picture as a file called `name()`. */
+  pngButton(name) {
+    return button('PNG', 'Save the picture as PNG', () => this.png().then((blob) => saveNamed(name(), 'png', blob)));
   }
 
   #resize() {
