@@ -17,11 +17,8 @@ export function quoted(text) {
 export function csvOf(panel) {
   const {view} = panel.shared;
   const shown = panel.lines.map((line, i) => ({line, i})).filter(({line}) => !panel.hidden.has(line.label));
-  const headed = (line) => {
-    const unit = line.signal?.unit || panel.definition.unit;
-    return unit ? `${line.label} (${unit})` : line.label;
-  };
-  const rows = [['time (s)', ...shown.map(({line}) => headed(line))].map(quoted).join(',')];
+  const headed = ({label}, unit) => (unit ? `${label} (${unit})` : label);
+  const rows = [['time (s)', ...shown.map(({line}) => headed(line, panel.unitOf(line)))].map(quoted).join(',')];
   const times = panel.data[0];
   for (let k = 0; k < times.length; ++k) {
     if (times[k] < view.min - 1e-9 || times[k] > view.max + 1e-9) continue;

@@ -1,10 +1,13 @@
 // Which plots a run gets: the paper's figures of its section, then what every run is looked at for.
+import {rotate} from './spatial.js';
 import {LIMITS_SHOWN} from './units.js';
 
 const series = (label, role, type, field) => ({label, role, type, field});
 /** The message of what follows from others: lcmtypes/derived/. */
 export const DERIVED = 'derived.signals_t';
 const derived = (label, role, field) => series(label, role, DERIVED, field);
+/** A line for each axis of a vector `field`. */
+const ofAxes = (field, type = DERIVED) => ['x', 'y', 'z'].map((axis, i) => series(axis, `axis-${axis}`, type, `${field}[${i}]`));
 
 /** Ratios of a sole's wrench to |F_z| that (30)-(33) limit. */
 const CONDITIONS = [
@@ -16,16 +19,16 @@ const CONDITIONS = [
 
 const SUPPORT_NOTE = 'The yellow areas show when balancing runs.';
 
-function comMotion(run, figure, title, axes, note = '') {
+/** Of all three axes, or sideways only. */
+function comMotion(run, figure, lateral, note = '') {
   // Whoever came late, or has a part of the run, knows no earlier place.
   const origin = run.meta.live ? ' Motion from where it was in the first tick that the viewer heard.'
     : run.firstTick > 0 ? ` Motion from where it was at ${run.start.toFixed(3)} s, the first that this page has.` : '';
-  return {figure, title, unit: 'm', note: (note + origin).trim(), series: axes.flatMap((axis) => [
-    derived(axes.length > 1 ? axis : 'estimated', axes.length > 1 ? `axis-${axis}` : 'computed', `com_motion[${'xyz'.indexOf(axis)}]`),
-    derived(axes.length > 1 ? `${axis}, true` : 'true', axes.length > 1 ? `axis-${axis}-thin` : 'truth',
-      `com_motion_true[${'xyz'.indexOf(axis)}]`),
-    ...(axes.length > 1 ? [] : [derived('desired', 'desired', `com_motion_desired[${'xyz'.indexOf(axis)}]`)]),
-  ])};
+  return {figure, title: lateral ? 'COM motion, lateral (y)' : 'COM motion', unit: 'm', note: (note + origin).trim(), series: lateral
+    ? [derived('estimated', 'computed', 'com_motion[1]'), derived('true', 'truth', 'com_motion_true[1]'),
+      derived('desired', 'desired', 'com_motion_desired[1]')]
+    : ['x', 'y', 'z'].flatMap((axis, i) => [derived(axis, `axis-${axis}`, `com_motion[${i}]`),
+      derived(`${axis}, true`, `axis-${axis}-thin`, `com_motion_true[${i}]`)])};
 }
 
 const push = (figure) => ({figure, title: 'External push, magnitude', unit: 'N',
@@ -77,20 +80,19 @@ function footMotion(figure, run, foot, axis, note) {
     series('desired', 'desired', 'support_plan_t', `foot_reference[${foot}].position[${axis}]`)]};
 }
 
-/** Indices of the joints between base and foot that turn about the world's y axis in the zero posture, nearly. */
-export function pitchJoints(robot, foot) {
+/** Indices of the bodies between the base and a foot, the foot's last. */
+function legOf(robot, foot) {
   const chain = [];
   for (let b = robot.feet[foot].body; robot.bodies[b].joint >= 0; b = robot.bodies[b].parent) chain.unshift(b);
-  let [w, x, y, z] = [1, 0, 0, 0];
-  const result = [];
-  for (const b of chain) {
-    const {origin: {orientation: q}, axis, joint} = robot.bodies[b];
-    [w, x, y, z] = [w * q[0] - x * q[1] - y * q[2] - z * q[3], w * q[1] + x * q[0] + y * q[3] - z * q[2],
-      w * q[2] - x * q[3] + y * q[0] + z * q[1], w * q[3] + x * q[2] - y * q[1] + z * q[0]];
-    const across = axis[0] * 2 * (x * y + w * z) + axis[1] * (1 - 2 * (x * x + z * z)) + axis[2] * 2 * (y * z - w * x);
-    if (Math.abs(across) > 0.8) result.push(joint);
-  }
-  return result;
+  return chain;
+}
+
+/** Indices of the joints between base and foot that turn about the world's y axis in the zero posture, nearly. */
+export function pitchJoints(robot, foot) {
+  const leg = legOf(robot, foot);
+  const across = (k) => leg.slice(0, k + 1)
+    .reduceRight((axis, b) => rotate(robot.bodies[b].origin.orientation, axis), robot.bodies[leg[k]].axis)[1];
+  return leg.filter((_, k) => Math.abs(across(k)) > 0.8).map((b) => robot.bodies[b].joint);
 }
 
 function jointTorque(figure, run, joint) {
@@ -111,19 +113,19 @@ export function changesOf({variant, ablations = [], changes = []}) {
 /** The paper's figures by section. */
 const SECTIONS = {
   '7.1': (run) => [...footWrenches(run, '6'),
-    comMotion(run, '7', 'COM motion', ['x', 'y', 'z'], 'The paper sees 1 to 3 mm.')],
+    comMotion(run, '7', false, 'The paper sees 1 to 3 mm.')],
   '7.2': (run) => [
-    comMotion(run, '9a', 'COM motion, lateral (y)', ['y'], `${SUPPORT_NOTE} The paper\'s largest: 35 mm.`), push('9b'),
+    comMotion(run, '9a', true, `${SUPPORT_NOTE} The paper\'s largest: 35 mm.`), push('9b'),
     ...resultantConditions(run, '10'), ...footConditions(run, '11', 0), ...footConditions(run, '12', 1)],
   '7.3': (run) => [
-    comMotion(run, '14a', 'COM motion, lateral (y)', ['y'], `${SUPPORT_NOTE} The paper\'s largest: 10.6 mm.`),
+    comMotion(run, '14a', true, `${SUPPORT_NOTE} The paper\'s largest: 10.6 mm.`),
     footMotion('14b', run, 1, 1, 'The paper\'s largest error: 15 mm.'), push('14c'),
     ...footConditions(run, '15', 0)],
   '7.4': (run) => [
     ...pitchJoints(run.robot, 0).map((joint, i) => jointTorque(`16${'abcdef'[i]}`, run, joint)),
     footMotion('17', run, 1, 2)],
   '7.5': (run) => [
-    comMotion(run, '19a', 'COM motion, lateral (y)', ['y'], SUPPORT_NOTE), footMotion('19b', run, 1, 2),
+    comMotion(run, '19a', true, SUPPORT_NOTE), footMotion('19b', run, 1, 2),
     footMotion('20a', run, 1, 2, 'As 19b: zoom in on the contact.'),
     {figure: '20b', title: 'Vertical force on the left foot', unit: 'N', series: [
       derived(measuredName(run), 'measured', 'foot[1].load_measured'),
@@ -133,7 +135,7 @@ const SECTIONS = {
 };
 
 function defaults(run) {
-  return [comMotion(run, '', 'COM motion, lateral (y)', ['y']), comMotion(run, '', 'COM motion', ['x', 'y', 'z']), push(''),
+  return [comMotion(run, '', true), comMotion(run, '', false), push(''),
     ...resultantConditions(run, ''), ...run.robot.feet.flatMap((_, f) => footConditions(run, '', f))];
 }
 
@@ -144,14 +146,10 @@ const torqueDrawn = (run) => (run.find('ground_truth_t', 'joint_torque[0]') ? 't
 
 /** What every run is looked at for. */
 function common(run, covered) {
-  const legs = run.robot.feet.map((foot, f) => {
-    const joints = [];
-    for (let b = foot.body; run.robot.bodies[b].joint >= 0; b = run.robot.bodies[b].parent) {
-      joints.unshift(run.robot.bodies[b].joint);
-    }
-    return {title: `Torques of the ${foot.name} leg, of their limits`, unit: '%', limits: [-100, 100], note: `Drawn: ${torqueDrawn(run)}.`,
-      series: joints.map((j, i) => derived(run.robot.joints[j].name, `hue-${i}`, `torque_share[${j}]`)), key: `leg-${f}`};
-  });
+  const {bodies, joints, feet} = run.robot;
+  const legs = feet.map((foot, f) => (
+    {title: `Torques of the ${foot.name} leg, of their limits`, unit: '%', limits: [-100, 100], note: `Drawn: ${torqueDrawn(run)}.`,
+      series: legOf(run.robot, f).map((b) => bodies[b].joint).map((j, i) => derived(joints[j].name, `hue-${i}`, `torque_share[${j}]`))}));
   const eta = (label, role, field) => series(label, role, 'joint_command_t', field);
   return [
     {title: 'Vertical force of the ground on each foot', unit: 'N', series: ofFeet(run, (foot, f, what) =>
@@ -160,13 +158,10 @@ function common(run, covered) {
       eta('commanded', 'computed', 'eta'), eta('optimal (71)', 'desired', 'eta_optimal'),
       eta('lower bound', 'limit', 'eta_min'), eta('upper bound', 'limit', 'eta_max')]},
     ...legs,
-    {title: 'COM error', unit: 'm',
-      series: ['x', 'y', 'z'].map((axis, i) => derived(axis, `axis-${axis}`, `com_error[${i}]`))},
-    {title: 'Orientation error of the body', unit: 'rad', series: ['x', 'y', 'z'].map((axis, i) =>
-      series(axis, `axis-${axis}`, 'task_torque_t', `body_orientation_error[${i}]`))},
+    {title: 'COM error', unit: 'm', series: ofAxes('com_error')},
+    {title: 'Orientation error of the body', unit: 'rad', series: ofAxes('body_orientation_error', 'task_torque_t')},
     {title: 'Estimator: base position, estimated less true', unit: 'm',
-      series: [...['x', 'y', 'z'].map((axis, i) => derived(axis, `axis-${axis}`, `base_position_error[${i}]`)),
-        derived('3 σ of the norm', 'limit', 'base_position_bound')]},
+      series: [...ofAxes('base_position_error'), derived('3 σ of the norm', 'limit', 'base_position_bound')]},
     {title: 'Estimator: tilt error', unit: 'rad',
       series: [derived('tilt', 'computed', 'base_tilt_error'), derived('3 σ', 'limit', 'base_tilt_bound')]},
     {title: 'Estimator: velocity error', unit: 'm/s',

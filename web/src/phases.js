@@ -47,9 +47,8 @@ class Phases {
       this.#support = new Stretches();
       this.#next = 0;
     });
-    const get = (type, field) => run.find(type, field);
-    this.#active = [get('balance_torque_t', 'active_x'), get('balance_torque_t', 'active_y')].filter(Boolean);
-    this.#contact = run.robot.feet.map((_, f) => get('support_plan_t', `in_contact[${f}]`)).filter(Boolean);
+    this.#active = ['active_x', 'active_y'].map((field) => run.find('balance_torque_t', field)).filter(Boolean);
+    this.#contact = run.robot.feet.map((_, f) => run.find('support_plan_t', `in_contact[${f}]`)).filter(Boolean);
   }
 
   async load() {
@@ -72,10 +71,10 @@ class Phases {
       stretches.dropBefore(run.firstTick);
       return stretches.list(run.rows ? 0 : BRIDGED / run.period).map(seconds);
     };
-    const support = list(this.#support);
+    const support = this.#contact.length ? list(this.#support) : [];
     this.balancing = list(this.#balancing).filter((p) => p.value);
-    this.support = this.#contact.length ? support.filter((p) => p.value !== undefined) : [];
-    this.missing = this.#contact.length ? support.filter((p) => p.value === undefined) : [];
+    this.support = support.filter((p) => p.value !== undefined);
+    this.missing = support.filter((p) => p.value === undefined);
   }
 
   #isBalancing(row) {

@@ -1,6 +1,6 @@
 // Plots over time: one zoom and one time cursor for all of them.
 import uPlot from 'uplot';
-import {element, saveNamed, shape} from './dom.js';
+import {element, saveNamed, shape, signButton} from './dom.js';
 import {csvOf, pngFile, svgFile, svgOf} from './export.js';
 import {findSignal} from './figures.js';
 import {cssColor, onThemeChange, styleOf} from './palette.js';
@@ -9,7 +9,7 @@ import {formatNumber, leastSpan, limitedEnd, paddedRange, quantity, scaled} from
 const HEIGHT = 200;       // px
 const CLICK_SLACK = 4;    // px that a click may move
 const ZOOM_STEP = 1.25;
-const SHADE = '4d';       // how opaque a line's colour is between its bounds, 30 %
+const SHADE = '4d';       // how opaque a line's colour, #rrggbb, is between its bounds, 30 %
 
 /** The stretch of time that all plots show. Fires 'change', and 'away' when the run's end was put out of sight. */
 export class TimeView extends EventTarget {
@@ -54,10 +54,7 @@ export class TimeView extends EventTarget {
 /** Numbers of the rows [from, n) as uPlot wants them: null where there is none. */
 function nullable(values, n, from = 0) {
   const result = new Array(n - from);
-  for (let i = from; i < n; ++i) {
-    const v = i < values.length ? values[i] : NaN;
-    result[i - from] = Number.isFinite(v) ? v : null;
-  }
+  for (let i = from; i < n; ++i) result[i - from] = Number.isFinite(values[i]) ? values[i] : null;
   return result;
 }
 
@@ -85,9 +82,6 @@ function sameValues({signal, run: other, series}, lines, run) {
   return resampled(signal.values, run, other).every((value, row) => value === null || Number.isNaN(first[row]) || value === first[row]);
 }
 
-/** A colour, #rrggbb, that shows what lies beneath it. */
-const translucent = (color) => color + SHADE;
-
 /** The last number in a few rows: what a channel with few messages said last. */
 function lastNumber(values, row) {
   for (let i = row; i >= 0; --i) if (!Number.isNaN(values[i])) return values[i];
@@ -95,24 +89,22 @@ function lastNumber(values, row) {
 }
 
 /** One plot. `definition` as figures.js gives it; `shared`: {run, others, player, view, phases, events}. */
-export class Panel {
+class Panel {
   constructor(definition, shared, onRemove) {
     Object.assign(this, {definition, shared});
     this.hidden = new Set();
     this.host = element('div', {class: 'plot-host'});
     this.legend = element('div', {class: 'legend'});
     this.cursor = element('div', {class: 'time-cursor'});
-    const button = (text, label, action) => element('button', {type: 'button', title: label, 'aria-label': label,
-      click: action}, text);
     this.element = element('article', {class: 'panel'},
       element('header', {},
         definition.figure ? element('span', {class: 'figure-number'}, `Fig. ${definition.figure}`) : '',
         element('h3', {}, definition.title),
         element('span', {class: 'panel-buttons'},
-          button('CSV', 'Save the stretch shown as CSV', async () => this.#save('csv', await this.csv())),
-          button('PNG', 'Save as PNG', async () => this.#save('png', await pngFile(await this.svg()))),
-          button('SVG', 'Save as SVG', async () => this.#save('svg', svgFile(await this.svg()))),
-          onRemove ? button('×', 'Remove this plot', () => onRemove(this)) : '')),
+          signButton('CSV', 'Save the stretch shown as CSV', async () => this.#save('csv', await this.csv())),
+          signButton('PNG', 'Save as PNG', async () => this.#save('png', await pngFile(await this.svg()))),
+          signButton('SVG', 'Save as SVG', async () => this.#save('svg', svgFile(await this.svg()))),
+          onRemove ? signButton('×', 'Remove this plot', () => onRemove(this)) : '')),
       this.host, this.legend, definition.note ? element('p', {class: 'note'}, definition.note) : '');
   }
 
@@ -121,17 +113,19 @@ export class Panel {
     return this.building ??= this.#build();
   }
 
+  /** The same, and what is done `then`; where it fails, the plot's place says why. */
+  draw(then) {
+    return this.show().then(then).catch((error) => {
+      console.error(error);
+      this.host.replaceChildren(element('p', {class: 'failed', role: 'alert'}, `cannot be drawn: ${error.message}`));
+    });
+  }
+
   async #build() {
     await this.#load();
     this.#create();
     new ResizeObserver(() => this.resize()).observe(this.host);
     this.updateCursor();
-  }
-
-  /** Says in the plot's place why there is none. */
-  fail(error) {
-    console.error(error);
-    this.host.replaceChildren(element('p', {class: 'failed', role: 'alert'}, `cannot be drawn: ${error.message}`));
   }
 
   async #load() {
@@ -224,7 +218,7 @@ export class Panel {
       bands: this.#bounded().map((line, k) => {
         const {color} = styleOf(line.role);
         const first = this.lines.length + 1 + 2 * k;
-        return {series: [first, first + 1], fill: () => translucent(color())};
+        return {series: [first, first + 1], fill: () => color() + SHADE};
       }),
       hooks: {
         drawClear: [(u) => this.#shade(u)],
@@ -289,19 +283,15 @@ export class Panel {
     const at = index === null ? player.row : this.firstTick + index - run.firstTick;
     this.lines.forEach((line, i) => {
       if (line.constant !== undefined) return;
-      const {values, integer, channel} = line.signal;
+      const {values, valueNames, integer, channel} = line.signal;
       const row = line.run.rowOf(run.timeAt(at));
       const value = channel.sparse ? lastNumber(values, row) : values[row] ?? NaN;
-      this.values[i].textContent = (integer && this.#nameOf(line.signal, value)) || quantity(value, this.#unitOf(line), 4, !this.definition.added);
+      const name = integer ? valueNames?.[value] : undefined;
+      this.values[i].textContent = name !== undefined ? `${value} ${name}` : quantity(value, this.unitOf(line), 4, !this.definition.added);
     });
   }
 
-  #unitOf(line) { return line.signal?.unit || this.definition.unit; }
-
-  #nameOf(signal, value) {
-    const name = signal.valueNames?.[value];
-    return name === undefined ? '' : `${value} ${name}`;
-  }
+  unitOf(line) { return line.signal?.unit || this.definition.unit; }
 
   /** [stretches of time, the name of their colour]: what lies beneath the lines. */
   areas() {
@@ -326,12 +316,8 @@ export class Panel {
     ctx.strokeStyle = cssColor('--event');
     ctx.lineWidth = 1;
     ctx.setLineDash([2, 3]);
-    for (const event of events) {
-      if (event.time < min || event.time > max) continue;
-      ctx.beginPath();
-      ctx.moveTo(x(event.time), bbox.top);
-      ctx.lineTo(x(event.time), bbox.top + bbox.height);
-      ctx.stroke();
+    for (const {time} of events) {
+      if (time >= min && time <= max) ctx.stroke(new Path2D(`M${x(time)} ${bbox.top}v${bbox.height}`));
     }
     ctx.restore();
   }
@@ -378,7 +364,7 @@ export class Panel {
       this.#create();
       this.updateCursor();
     });
-    this.building.catch((error) => this.fail(error));
+    this.draw();
   }
 
   async csv() {
@@ -410,9 +396,8 @@ export class PanelGrid {
     this.observer = new IntersectionObserver((entries) => {
       for (const {target, isIntersecting} of entries) {
         const panel = this.panels.find((p) => p.element === target);
-        if (!panel) continue;
         if (!isIntersecting) this.inSight.delete(panel);
-        else this.#enter(panel);
+        else if (panel) this.#enter(panel);
       }
     }, {rootMargin: '150px'});
     shared.view.addEventListener('change', () => {
@@ -428,12 +413,12 @@ export class PanelGrid {
 
   #enter(panel) {
     this.inSight.add(panel);
-    panel.show().then(() => {
+    panel.draw(() => {
       if (panel.stale) panel.redraw();
       panel.stale = false;
       panel.updateCursor();
       panel.updateValues();
-    }).catch((error) => panel.fail(error));
+    });
   }
 
   updateValues() { this.inSight.forEach((p) => p.updateValues()); }
@@ -455,8 +440,7 @@ export class PanelGrid {
   add(definition, first = false) {
     const panel = new Panel(definition, this.shared, definition.added ? (p) => this.remove(p) : null);
     this.panels.push(panel);
-    if (first) this.host.prepend(panel.element);
-    else this.host.append(panel.element);
+    this.host[first ? 'prepend' : 'append'](panel.element);
     this.observer.observe(panel.element);
     return panel;
   }

@@ -1,5 +1,5 @@
 // The page on paper: every plot drawn, light, as wide as half a page, and the picture as an image.
-import {element} from './dom.js';
+import {button, element} from './dom.js';
 import {setPaper} from './palette.js';
 
 const PLOT_WIDTH = 325;        // CSS px: two beside each other on A4 and on letter
@@ -10,19 +10,18 @@ export class Printer {
 
   constructor(grid, scene) {
     Object.assign(this, {grid, scene});
-    this.button = element('button', {type: 'button', title: 'Print the page with all plots (ctrl + P)',
-      click: () => this.print()}, 'Print');
+    this.button = button('Print', 'Print the page with all plots (ctrl + P)', () => this.print());
     document.addEventListener('keydown', (e) => {
       if (!(e.ctrlKey || e.metaKey) || e.altKey || e.shiftKey || e.key.toLowerCase() !== 'p') return;
       e.preventDefault();
       this.print();
     });
-    addEventListener('beforeprint', () => this.#toPaper());
-    addEventListener('afterprint', () => this.#toScreen());
+    addEventListener('beforeprint', () => this.#show(true));
+    addEventListener('afterprint', () => this.#show(false));
   }
 
   async drawAll() {
-    for (const panel of this.grid.panels) await panel.show().catch((error) => panel.fail(error));
+    for (const panel of this.grid.panels) await panel.draw();
     this.grid.redrawAll();
   }
 
@@ -41,28 +40,21 @@ export class Printer {
         document.documentElement.dataset.drawn = '';
         return;
       }
-      panel.show().catch((error) => panel.fail(error)).then(() => idle(next));
+      panel.draw().then(() => idle(next));
     };
     idle(next);
   }
 
-  #toPaper() {
-    setPaper(true);
+  #show(onPaper) {
+    setPaper(onPaper);
     this.scene.setTheme();
-    const url = this.scene.imageUrl();
+    this.#picture.remove();
+    const url = onPaper && this.scene.imageUrl();
     if (url) {
       this.#picture.src = url;
       document.getElementById('scene-place').prepend(this.#picture);
     }
-    for (const panel of this.grid.panels) panel.resize(PLOT_WIDTH);
-    this.grid.restyle();
-  }
-
-  #toScreen() {
-    setPaper(false);
-    this.#picture.remove();
-    this.scene.setTheme();
-    for (const panel of this.grid.panels) panel.resize();
+    for (const panel of this.grid.panels) panel.resize(onPaper ? PLOT_WIDTH : undefined);
     this.grid.restyle();
   }
 }

@@ -36,22 +36,20 @@ export class Readout {
 
 /** [name, signals, text of their values] */
 function rowsOf(run) {
-  const find = (type, field) => run.find(type, field);
-  const derived = (...fields) => fields.map((field) => find(DERIVED, field));
-  const named = (signal) => ([v]) => signal.valueNames?.[v] ?? formatNumber(v);
+  const derived = (...fields) => fields.map((field) => run.find(DERIVED, field));
+  const named = (name, type, field) => {
+    const signal = run.find(type, field);
+    return [name, [signal], ([v]) => signal.valueNames?.[v] ?? formatNumber(v)];
+  };
   const metres = (values) => quantity(values, 'm', DIGITS, true);
   const newton = (values) => quantity(values, 'N', DIGITS, true);
-  const plan = find('support_plan_t', 'status');
-  const status = find('task_torque_t', 'status');
-  const bridge = find('bridge_status_t', 'state');
-  const phase = find('planner_status_t', 'phase');
-  const step = ['stepping', 'step_reason', 'step_foot'].map((field) => find('planner_status_t', field));
+  const step = ['stepping', 'step_reason', 'step_foot'].map((field) => run.find('planner_status_t', field));
   const feet = run.robot.feet.map((foot) => foot.name);
   return [
-    ['phase', [phase], ([i]) => run.scenario.step_planner?.phase?.[i]?.name ?? formatNumber(i)],
-    ['plan', [plan], plan && named(plan)], ['controller', [status], status && named(status)], ['bridge', [bridge], bridge && named(bridge)],
-    ['η', [find('joint_command_t', 'eta')], ([v]) => formatNumber(v, DIGITS)],
-    ['CoP computed x, y', ['cop[0]', 'cop[1]'].map((f) => find('balance_torque_t', f)), metres],
+    ['phase', [run.find('planner_status_t', 'phase')], ([i]) => run.scenario.step_planner?.phase?.[i]?.name ?? formatNumber(i)],
+    named('plan', 'support_plan_t', 'status'), named('controller', 'task_torque_t', 'status'), named('bridge', 'bridge_status_t', 'state'),
+    ['η', [run.find('joint_command_t', 'eta')], ([v]) => formatNumber(v, DIGITS)],
+    ['CoP computed x, y', ['cop[0]', 'cop[1]'].map((f) => run.find('balance_torque_t', f)), metres],
     [`CoP ${measuredName(run)} x, y`, derived('cop_measured[0]', 'cop_measured[1]'), metres],
     ['COM error x, y, z', derived('com_error[0]', 'com_error[1]', 'com_error[2]'), metres],
     ['push', derived('push_magnitude'), newton],
@@ -100,8 +98,7 @@ export class EventList {
     const now = this.player.time + this.player.run.period / 2;
     const last = this.#buttons.findLast(([time]) => time <= now)?.[0];
     for (const [time, button] of this.#buttons) {
-      if (time === last) button.setAttribute('aria-current', 'time');
-      else button.removeAttribute('aria-current');
+      button.ariaCurrent = time === last ? 'time' : null;
     }
   }
 }
