@@ -68,12 +68,6 @@ export function liveText(feed) {
   return ['behind', Number.isFinite(feed.behind) ? `◐ ${feed.behind.toFixed(1)} s behind` : LIVE_TEXTS.connecting];
 }
 
-/** Of which ticks a row's picture and numbers are, where it holds several. */
-function rowText(run, row) {
-  const stride = run.strideOf(row);
-  return stride > 1 ? ` of ${stride}` : '';
-}
-
 /** Fills `host`; `shared` as for panels, `feed` when the run is live. Returns {refresh}, for a run that has grown. */
 export function playerBar(host, shared) {
   const {player, view, run} = shared;
@@ -106,7 +100,9 @@ export function playerBar(host, shared) {
   const showTime = () => {
     scrub.value = player.tick;
     if (player.tick < run.firstTick) return time.replaceChildren();  // nothing has come yet, or again
-    time.replaceChildren(`${player.time.toFixed(3)} s`, element('span', {class: 'tick'}, `  tick ${player.tick}${rowText(run, player.row)}`));
+    const stride = run.strideOf(player.row);  // a row may hold several ticks
+    time.replaceChildren(`${player.time.toFixed(3)} s`,
+      element('span', {class: 'tick'}, `  tick ${player.tick}${stride > 1 ? ` of ${stride}` : ''}`));
   };
   player.addEventListener('time', showTime);
   player.addEventListener('state', () => {

@@ -16,7 +16,7 @@ async function inflate(bytes) {
 const NOT_A_NUMBER = -0x80000000;
 
 /** Values from inflated byte planes, into `values` (Float32Array or Float64Array). */
-export function decodePlanes(planes, step, order, values) {
+function decodePlanes(planes, step, order, values) {
   const n = values.length;
   if (planes.length !== 4 * n) throw new Error(`a column holds ${planes.length / 4} values, not ${n}`);
   const ints = new Int32Array(n);

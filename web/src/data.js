@@ -3,17 +3,11 @@ import {unpack} from './codec.js';
 import {Column} from './column.js';
 import {parseMessage} from './messages.js';
 
-/** Names of the elements of lists by their count in a message; motors stand in the order of the joints that they drive. */
-function elementNames(robot) {
-  const joints = robot.joints.map((joint) => joint.name);
-  return {num_joints: joints, num_motors: joints, num_feet: robot.feet.map((foot) => foot.name)};
-}
-
 /**
  * Unit, text, names of values and label of a field path such as "foot_wrench[1].force[2]". The label names joints and feet:
  * "foot_wrench[left].force[2]". `names`: of lists' elements by the message's count.
  */
-export function describeField(messages, type, path, names = {}) {
+function describeField(messages, type, path, names) {
   let message = messages[type];
   let result = {unit: '', text: ''};
   const labels = path.split('.');
@@ -31,7 +25,7 @@ export function describeField(messages, type, path, names = {}) {
 }
 
 /** One scalar by row; NaN where its channel has no message. `values` is there after load(). */
-export class Signal {
+class Signal {
   #column = null;
   #loading = null;
 
@@ -48,7 +42,7 @@ export class Signal {
     Object.assign(this, description);
     /** As people read it: joints and feet by their names. */
     this.title = `${channel.name}.${this.label}`;
-    if (channel.run.meta.live) this.#start();
+    if (channel.run.meta.live) this.clear();
   }
 
   get values() { return this.#column?.values; }
@@ -72,15 +66,12 @@ export class Signal {
   /** Adds `values` at the end and lets go of the first `dropped`. Throws when packed values have not been loaded. */
   append(values, dropped = 0) {
     if (!this.#column && this.spec.blob !== undefined) throw new Error(`${this.name}: load it before it grows`);
-    if (!this.#column) this.#start();
+    if (!this.#column) this.clear();
     this.#column.append(values, dropped, this.channel.run.keep);
   }
 
-  /** Lets go of all values, of a run that starts anew. */
-  clear() { this.#start(); }
-
-  /** There is nothing to load. */
-  #start() {
+  /** Has no values, and none to load: of a run that grows from here. */
+  clear() {
     this.#column = new Column(this.integer ? new Float64Array(0) : new Float32Array(0));
     this.#loading = Promise.resolve();
   }
@@ -166,13 +157,17 @@ export class Run extends EventTarget {
     this.rows = meta.rows && new Rows(meta.rows, meta.run.ticks);
     this.numRows = this.rows?.count ?? Math.max(0, meta.run.ticks - this.firstTick);
     this.keep = meta.live?.keep ?? Infinity;
+    this.restarts = 0;
     this.signals = new Map();
-    const names = elementNames(meta.robot);
+    const joints = meta.robot.joints.map((joint) => joint.name);
+    // Of the elements of lists, by their count in a message; motors stand in the order of the joints that they drive.
+    const names = {num_joints: joints, num_motors: joints, num_feet: meta.robot.feet.map((foot) => foot.name)};
     const known = {...messages, ...Object.fromEntries((meta.messages ?? []).map(parseMessage).map((m) => [m.name, m]))};
     this.channels = meta.channels.map((spec) => {
       const channel = new Channel(this, spec, blob);
       for (const signal of spec.signals) {
-        this.add(new Signal(channel, signal, describeField(known, spec.type, signal.field, names)));
+        const made = new Signal(channel, signal, describeField(known, spec.type, signal.field, names));
+        this.signals.set(made.name, made);
       }
       return channel;
     });
@@ -181,7 +176,6 @@ export class Run extends EventTarget {
   /** Time of the first row and of the last, s. */
   get start() { return this.timeAt(0); }
   get end() { return this.timeAt(Math.max(0, this.numRows - 1)); }
-  add(signal) { this.signals.set(signal.name, signal); }
 
   /** The signal of the first channel of `type`, as the run's checks take it; undefined when there is none. */
   find(type, field) {
@@ -238,7 +232,7 @@ export class Run extends EventTarget {
 
   /** Rows hold other ticks than before: `restarts` counts that. */
   #renumber() {
-    this.restarts = (this.restarts ?? 0) + 1;
+    ++this.restarts;
     this.dispatchEvent(new Event('restart'));
   }
 }

@@ -1,8 +1,6 @@
 // Small helpers for the page's elements. Texts of a log are set as text only, never as HTML.
 
-/** An element with attributes (functions: event listeners by name) and children (elements or texts). */
-export function element(tag, attributes = {}, ...children) {
-  const result = document.createElement(tag);
+function filled(result, attributes, children) {
   for (const [name, value] of Object.entries(attributes)) {
     if (typeof value === 'function') result.addEventListener(name, value);
     else if (value === true) result.setAttribute(name, '');
@@ -12,15 +10,12 @@ export function element(tag, attributes = {}, ...children) {
   return result;
 }
 
-const SVG = 'http://www.w3.org/2000/svg';
+/** An element with attributes (functions: event listeners by name) and children (elements or texts). */
+export const element = (tag, attributes = {}, ...children) => filled(document.createElement(tag), attributes, children);
 
 /** The same for a picture's shapes. */
-export function shape(tag, attributes = {}, ...children) {
-  const result = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) result.setAttribute(name, value);
-  result.append(...children);
-  return result;
-}
+export const shape = (tag, attributes = {}, ...children) =>
+  filled(document.createElementNS('http://www.w3.org/2000/svg', tag), attributes, children);
 
 /** A button with a text or an icon; `title` stands under the mouse. */
 export const button = (text, title, click, more = {}) => element('button', {type: 'button', title, click, ...more}, text);

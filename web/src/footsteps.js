@@ -31,7 +31,7 @@ export class Footprints {
   /** Takes the ticks that have come. */
   update() {
     const {run} = this;
-    if ((run.restarts ?? 0) !== this.#restarts) {
+    if (run.restarts !== this.#restarts) {
       this.#restarts = run.restarts;
       this.list = [];
       this.#last = [];
@@ -55,8 +55,7 @@ export class Footprints {
 
   /** Of those that had begun at a time the last `count`. */
   until(time, count) {
-    let end = this.list.length;
-    while (end > 0 && this.list[end - 1].from > time + this.run.period / 2) --end;
+    const end = this.list.findLastIndex(({from}) => from <= time + this.run.period / 2) + 1;
     return this.list.slice(Math.max(0, end - count), end);
   }
 }

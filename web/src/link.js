@@ -1,12 +1,12 @@
 // What is looked at stands in the page's address: "#t=0.81&from=0.5&to=1.2&plot=JOINT_COMMAND.eta+JOINT_COMMAND.eta_min&hide=desired@COM error".
-import {element} from './dom.js';
+import {button} from './dom.js';
 import {lineOf, panelOf} from './figures.js';
 
 const PERIOD = 400;    // ms between looks; browsers refuse an address that changes too often
 const ANSWERED = 1500;  // ms
 
 /** The part after '#' of the time, the stretch shown, the plots that were added and the lines that were hidden; '' at first. */
-export function addressOf({run, player, view, grid}) {
+function addressOf({run, player, view, grid}) {
   const parts = new URLSearchParams();
   const seconds = (time) => String(Number(time.toFixed(6)));
   if (!player.following && player.time > run.start) parts.set('t', seconds(player.time));
@@ -20,7 +20,7 @@ export function addressOf({run, player, view, grid}) {
 }
 
 /** Shows what an address tells, as far as the run has it. */
-export function goTo(address, {run, player, view, grid}) {
+function goTo(address, {run, player, view, grid}) {
   const parts = new URLSearchParams(address);
   const time = (name) => (parts.has(name) ? Number(parts.get(name)) : NaN);
   for (const panel of grid.panels.filter(({definition}) => definition.added)) grid.remove(panel);
@@ -54,14 +54,14 @@ export function linkButton(shared) {
   addEventListener('hashchange', follow);
   setInterval(() => { if (!shared.player.playing) tell(); }, PERIOD);
   const answer = (text) => {
-    button.textContent = text;
-    setTimeout(() => { button.textContent = 'Link'; }, ANSWERED);
+    link.textContent = text;
+    setTimeout(() => { link.textContent = 'Link'; }, ANSWERED);
   };
-  const button = element('button', {type: 'button', title: 'Copy a link to this time, this stretch and these plots', click: async () => {
+  const link = button('Link', 'Copy a link to this time, this stretch and these plots', async () => {
     tell();
-    const link = new URL(location.href);
-    link.searchParams.delete('token');  // whoever gets the link may look, not act
-    await navigator.clipboard.writeText(link.href).then(() => answer('Link copied'), () => answer('The address has it'));
-  }}, 'Link');
-  return button;
+    const url = new URL(location.href);
+    url.searchParams.delete('token');  // whoever gets the link may look, not act
+    await navigator.clipboard.writeText(url.href).then(() => answer('Link copied'), () => answer('The address has it'));
+  });
+  return link;
 }

@@ -17,12 +17,8 @@ export class NoPicture {
   }
 
   async load() {}
-
   setRow() {}
-
   pace() {}
-
   setTheme() {}
-
-  imageUrl() { return undefined; }
+  imageUrl() {}
 }

@@ -36,17 +36,19 @@ class Stretches {
 class Phases {
   #active;
   #contact;
-  #balancing = new Stretches();
-  #support = new Stretches();
-  #next = 0;  // tick
+  #balancing;
+  #support;
+  #next;  // tick
 
   constructor(run) {
     this.run = run;
-    run.addEventListener('restart', () => {
+    const begin = () => {
       this.#balancing = new Stretches();
       this.#support = new Stretches();
       this.#next = 0;
-    });
+    };
+    run.addEventListener('restart', begin);
+    begin();
     this.#active = ['active_x', 'active_y'].map((field) => run.find('balance_torque_t', field)).filter(Boolean);
     this.#contact = run.robot.feet.map((_, f) => run.find('support_plan_t', `in_contact[${f}]`)).filter(Boolean);
   }
@@ -54,6 +56,7 @@ class Phases {
   async load() {
     await Promise.all([...this.#active, ...this.#contact].map((s) => s.load()));
     this.update();
+    return this;
   }
 
   /** After the run has grown. */
@@ -90,8 +93,4 @@ class Phases {
   }
 }
 
-export async function findPhases(run) {
-  const phases = new Phases(run);
-  await phases.load();
-  return phases;
-}
+export const findPhases = (run) => new Phases(run).load();

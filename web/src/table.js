@@ -5,8 +5,12 @@ import {latencyFigure, latencyTable} from './live/latency.js';
 import {formatNumber, withUnit} from './units.js';
 
 /** Of a check without a limit none; passed is null until the run has ended. */
-const verdict = ({limit, passed, missing}) => limit === null ? '' : isUnknown({missing}) ? element('span', {class: 'soft'}, unknownText({missing}))
-  : passed === null ? element('span', {class: 'soft'}, 'pending') : element('span', {class: passed ? 'ok' : 'failed'}, passed ? 'ok' : 'FAILED');
+function verdict(check) {
+  if (check.limit === null) return '';
+  const [kind, text] = isUnknown(check) ? ['soft', unknownText(check)] : check.passed === null ? ['soft', 'pending']
+    : check.passed ? ['ok', 'ok'] : ['failed', 'FAILED'];
+  return element('span', {class: kind}, text);
+}
 
 /** Whether nobody can say if it holds, for want of what `missing` lists. */
 const isUnknown = ({missing}) => missing?.length > 0;
@@ -37,10 +41,11 @@ function assumptionTable(run) {
     assumptions.map((a) => [element('code', {}, a.field), element('code', {}, a.value), a.kind, a.reason]));
 }
 
+const COUNTS = ['messages', 'missing', 'duplicate', 'out_of_order', 'refused'];
+
 const channelTable = (run) => table('Channels in the log',
-  ['channel', 'messages', 'missing', 'duplicate', 'out of order', 'refused'],
-  run.meta.run.channels.map((c) => [element('code', {}, c.name),
-    ...['messages', 'missing', 'duplicate', 'out_of_order', 'refused'].map((key) => formatNumber(c[key]))]),
+  ['channel', ...COUNTS.map((key) => key.replaceAll('_', ' '))],
+  run.meta.run.channels.map((c) => [element('code', {}, c.name), ...COUNTS.map((key) => formatNumber(c[key]))]),
   {numbers: [1, 2, 3, 4, 5]});
 
 function ticksOf(run) {
@@ -88,24 +93,21 @@ export function liveTables(run, feed) {
       run.meta.run.checks = found;
       if (checks.parentElement !== place) place.replaceChildren(...going);
       if (problem) {
-        checks.replaceChildren(element('p', {class: 'failed', role: 'status'},
-          `checks and events cannot be told: ${problem}`));
-        return;
-      }
-      if (ended) {
+        checks.replaceChildren(element('p', {class: 'failed', role: 'status'}, `checks and events cannot be told: ${problem}`));
+      } else if (ended) {
         run.meta.run.ended = true;
         place.replaceChildren(...tables(run, []));
-        return;
+      } else {
+        const caption = `Checks up to ${formatNumber(run.timeOfTick(ticks))} s: pending until the run's end`;
+        checks.replaceChildren(found.length ? checkTable(run, [], caption) : '');
+        latencies.replaceChildren(latencyFigure(components), latencyTable(components));
       }
-      checks.replaceChildren(...(found.length ? [checkTable(run, [],
-        `Checks up to ${formatNumber(run.timeOfTick(ticks))} s: pending until the run's end`)] : []));
-      latencies.replaceChildren(...[latencyFigure(components), latencyTable(components)].filter(Boolean));
     },
   };
 }
 
 /** "all 31 checks hold", or how many failed, by name under the mouse. */
-export function verdictBadge(run) {
+function verdictBadge(run) {
   const checks = run.meta.run.checks.filter((c) => c.limit !== null);
   const unknown = checks.filter(isUnknown), limited = checks.filter((c) => !isUnknown(c));
   const failed = limited.filter((c) => !c.passed);

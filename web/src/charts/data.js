@@ -2,7 +2,7 @@
 
 const TOLD = ['stands', 'fell', 'missed'];  // outcomes that tell whether the robot stood
 
-export const labelOf = (name, unit) => (unit ? `${name} [${unit}]` : name);
+const labelOf = (name, unit) => (unit ? `${name} [${unit}]` : name);
 const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 const finite = Number.isFinite;
 const unique = (items) => [...new Set(items)];

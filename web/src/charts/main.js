@@ -1,7 +1,7 @@
 // The page of charts: sets of results (docs/reference/charts.md), one or several laid over each other.
 import {chartOf, commandOf, layersOf} from './data.js';
 import {Chart} from './plot.js';
-import {element} from '../dom.js';
+import {button, element} from '../dom.js';
 import {onThemeChange, setPaper} from '../palette.js';
 import {formatNumber} from '../units.js';
 
@@ -66,12 +66,12 @@ class Tip {
 
 function copyable(text) {
   const code = element('code', {}, text);
-  return element('div', {class: 'command'}, code, element('button', {type: 'button', click: async (e) => {
-    const button = e.currentTarget;
+  const copy = button('Copy', null, async () => {
     getSelection().selectAllChildren(code);  // so that it can be copied by hand where the page may not
     const done = await navigator.clipboard.writeText(text).then(() => true, () => document.execCommand('copy'));
-    button.textContent = done ? 'Copied' : 'Selected';
-  }}, 'Copy'));
+    copy.textContent = done ? 'Copied' : 'Selected';
+  });
+  return element('div', {class: 'command'}, code, copy);
 }
 
 const tip = new Tip();
@@ -108,7 +108,7 @@ function header() {
       }}, '×') : '')),
     element('p', {class: 'soft'}, 'Each mark is what was run; nothing is known between two marks. Under the pointer it tells its values; '
       + 'a click keeps them, with the run’s page or the command that makes the run again. A stretch that is drawn over with the pointer is zoomed; a double click shows all.'),
-    element('p', {}, element('button', {type: 'button', click: () => input.click()}, 'Lay another charts.json over this…'), input));
+    element('p', {}, button('Lay another charts.json over this…', null, () => input.click()), input));
 }
 
 function grid(list) {
@@ -125,8 +125,9 @@ function sentences(layers) {
 function section(layers, titled) {
   const {part} = layers[0];
   // Asked for, and what stands; then what the runs measured, folded away where it is much.
-  const first = part.maps.filter((map) => map.value === undefined || part.kind === 'limit').map((map) => chartOf(layers, map, formatNumber)).filter(Boolean);
-  const rest = part.maps.filter((map) => map.value !== undefined && part.kind !== 'limit').map((map) => chartOf(layers, map, formatNumber)).filter(Boolean);
+  const isFirst = (map) => map.value === undefined || part.kind === 'limit';
+  const [first, rest] = [true, false].map((wanted) => part.maps.filter((map) => isFirst(map) === wanted)
+    .map((map) => chartOf(layers, map, formatNumber)).filter(Boolean));
   const same = layers.flatMap((layer) => layer.part.same ?? []);
   return element('section', {class: 'part'}, titled && part.title ? element('h2', {}, part.title) : '', ...sentences(layers), grid(first),
     rest.length ? element('details', {open: rest.length <= FEW_CHARTS}, element('summary', {}, `What the runs measured: ${rest.length} chart${rest.length === 1 ? '' : 's'}`), grid(rest)) : '',
@@ -150,21 +151,18 @@ function redraw() { charts.forEach((chart) => chart.redraw()); }
 try {
   for (const script of document.querySelectorAll('script.poise-charts')) addSet({folder: '', ...JSON.parse(script.textContent)});
   onThemeChange(redraw);
-  addEventListener('beforeprint', () => {
-    main.querySelectorAll('details').forEach((details) => { details.open = true; });
-    setPaper(true);
+  const print = (onPaper) => {
+    if (onPaper) main.querySelectorAll('details').forEach((details) => { details.open = true; });
+    setPaper(onPaper);
     redraw();
+  };
+  addEventListener('beforeprint', () => print(true));
+  addEventListener('afterprint', () => print(false));
+  addEventListener('dragover', (e) => e.preventDefault());
+  addEventListener('drop', (e) => {
+    e.preventDefault();
+    openFiles(e.dataTransfer.files);
   });
-  addEventListener('afterprint', () => {
-    setPaper(false);
-    redraw();
-  });
-  for (const event of ['dragover', 'drop']) {
-    addEventListener(event, (e) => {
-      e.preventDefault();
-      if (event === 'drop') openFiles(e.dataTransfer.files);
-    });
-  }
   if (sets.length > 0) render();
   else main.append(element('p', {role: 'alert'}, 'This page holds no data.'));
 } catch (error) {

@@ -9,7 +9,7 @@ const ANCHORS = {center: 'middle', right: 'end', end: 'end'};
 const BASELINES = {middle: 'central', top: 'text-before-edge', bottom: 'text-after-edge'};
 
 /** The elements that `draw` draws on `ctx`. Of paths it knows lines, arcs and rectangles. */
-export function elementsOf(ctx, draw) {
+function elementsOf(ctx, draw) {
   const out = [];
   let path = '';
   const common = () => {

@@ -34,11 +34,15 @@ const select = (label, options, more = {}) =>
   element('select', {'aria-label': label, ...more}, ...options.map((option) => element('option', {}, option)));
 const numberInput = (label, value, more = {}) => element('input', {type: 'number', step: 'any', min: 0, 'aria-label': label, value, ...more});
 
-/** `act` is called when what stands in its `parts` is to be sent. */
-const actForm = (act, ...parts) => element('form', {class: 'line', submit: (e) => {
-  e.preventDefault();
-  act();
-}}, ...parts);
+/** {element, update}: a form that sends an act `what` with what `told()` says of it. */
+function actForm(control, run, what, label, told, ...inputs) {
+  const send = element('button', {id: what}, label);
+  const form = element('form', {class: 'line', submit: (e) => {
+    e.preventDefault();
+    control.act(what, told());
+  }}, ...inputs, send);
+  return {element: form, update: () => disable(send, obstacle(what, control, run))};
+}
 
 /** One setting: its slider asks, its value is what is in force. */
 class SettingRow {
@@ -80,19 +84,18 @@ class SettingRow {
   }
 }
 
-function pushForm(control, robot) {
+function pushForm(control, run) {
   const {push_limit: limit, push_longest: longest = 1} = control.standing;
-  const body = select('Body', robot.bodies.map(({name}) => name));
+  const body = select('Body', run.robot.bodies.map(({name}) => name));
   const direction = select('Direction', Object.keys(DIRECTIONS));
   const force = numberInput('Force, N', Math.round(PUSH_SHARE * limit), {max: limit});
   const duration = numberInput('Duration, s', PUSH_DURATION, {min: 0.002, max: longest});
-  return actForm(() => control.act('push', {body: body.value, point: [0, 0, 0], duration: Number(duration.value),
-    force: DIRECTIONS[direction.value].map((x) => x * Number(force.value))}),
-  body, direction, force, 'N', duration, 's', element('button', {id: 'push'}, 'Push'));
+  return actForm(control, run, 'push', 'Push', () => ({body: body.value, point: [0, 0, 0], duration: Number(duration.value),
+    force: DIRECTIONS[direction.value].map((x) => x * Number(force.value))}), body, direction, force, 'N', duration, 's');
 }
 
 /** Sends a joint that no leg needs to an angle. */
-function moveForm(control) {
+function moveForm(control, run) {
   const joints = control.standing.movable;
   const joint = select('Joint', joints.map((j) => j.joint), {change: () => show()});
   const angle = numberInput('Angle, rad', 0);
@@ -103,8 +106,8 @@ function moveForm(control) {
     angle.value = Math.min(high, Math.max(low, Number(angle.value)));
   };
   show();
-  return actForm(() => control.act('move', {joint: joint.value, value: Number(angle.value), duration: Number(duration.value)}),
-    joint, angle, 'rad', duration, 's', element('button', {id: 'move'}, 'Move'));
+  return actForm(control, run, 'move', 'Move', () => ({joint: joint.value, value: Number(angle.value), duration: Number(duration.value)}),
+    joint, angle, 'rad', duration, 's');
 }
 
 /** Pad, sliders and buttons of a walk, and single steps; what this run cannot do is grey, and says why. */
@@ -214,35 +217,32 @@ export function controlPanel(control, shared) {
     const {standing} = control;
     const rows = (standing.settings ?? []).map((setting) => new SettingRow(control, setting));
     const undoButton = button('undo', 'Take the last change back (u)', () => undo.undo(), {id: 'undo'});
-    const tempo = control.can('pause') ? pace(control, player, run) : undefined;
-    const walk = control.can('walk') ? walking(control, run) : undefined;
-    const reset = control.can('reset') ? button('reset', 'End a stop, when the motors are at rest', () => control.act('reset'), {id: 'reset'}) : undefined;
-    const [paceAnswer, pushAnswer, walkAnswer, moveAnswer, stopAnswer] = [['pause', 'go', 'tick', 'speed', 'back', 'restart'],
-      ['push'], ['walk', 'stop_walking', 'step'], ['move'], ['stop', 'reset']].map((kinds) => answer(control, kinds));
-    const moving = control.can('move') && standing.movable?.length > 0 ? moveForm(control) : undefined;
-    const pushing = control.can('push') ? pushForm(control, run.robot) : undefined;
+    const dragged = {element: element('p', {class: 'soft'}, `Drag the robot to push it, up to ${formatNumber(standing.push_limit, 3)} N.`)};
+    const parts = [
+      [control.can('pause'), () => [pace(control, player, run)], ['pause', 'go', 'tick', 'speed', 'back', 'restart']],
+      [control.can('push'), () => [dragged, pushForm(control, run)], ['push']],
+      [control.can('move') && standing.movable?.length > 0, () => [moveForm(control, run)], ['move']],
+      [control.can('walk'), () => [walking(control, run)], ['walk', 'stop_walking', 'step']],
+    ].flatMap(([may, make, kinds]) => (may ? [...make(), answer(control, kinds)] : []));
+    const estop = button('EMERGENCY STOP', 'The bridge stops the robot (e)', () => control.act('stop'), {id: 'estop'});
+    const reset = button('reset', 'End a stop, when the motors are at rest', () => control.act('reset'), {id: 'reset'});
+    const stopAnswer = answer(control, ['stop', 'reset']);
     const lag = element('p', {class: 'answer lag', role: 'status'});
     const acts = element('ol', {class: 'acts', 'aria-live': 'polite'});
     const filter = element('input', {type: 'search', placeholder: 'setting', 'aria-label': 'Search settings', input: () => {
       const words = filter.value.toLowerCase();
       for (const row of rows) row.element.hidden = !`${row.field} ${row.element.title}`.toLowerCase().includes(words);
     }});
-    host.replaceChildren(...[element('h2', {}, 'Control'), lag,
-      ...(tempo ? [tempo.element, paceAnswer.element] : []),
-      ...(pushing ? [element('p', {class: 'soft'}, `Drag the robot to push it, up to ${formatNumber(standing.push_limit, 3)} N.`), pushing, pushAnswer.element] : []),
-      ...(moving ? [moving, moveAnswer.element] : []), ...(walk ? [walk.element, walkAnswer.element] : []), acts]);
+    host.replaceChildren(element('h2', {}, 'Control'), lag, ...parts.map((part) => part.element), acts);
     settings.replaceChildren(...(rows.length > 0 ? [element('details', {class: 'settings', open: true}, element('summary', {}, `${rows.length} settings`),
       element('div', {class: 'line'}, filter, undoButton), ...rows.map((row) => row.element))] : []));
-    stopHost.replaceChildren(...[control.can('stop') ? button('EMERGENCY STOP', 'The bridge stops the robot (e)', () => control.act('stop'), {id: 'estop'}) : '',
-      reset ?? '', stopAnswer.element].filter(Boolean));
+    stopHost.replaceChildren(...(control.can('stop') ? [estop] : []), ...(control.can('reset') ? [reset] : []), stopAnswer.element);
     host.hidden = false;
     update = () => {
-      for (const part of [...rows, tempo, walk, paceAnswer, pushAnswer, walkAnswer, moveAnswer, stopAnswer].filter(Boolean)) part.update();
+      for (const part of [...rows, ...parts, stopAnswer]) part.update?.();
       undoButton.disabled = !undo.next;
       undoButton.textContent = undo.next ? `undo ${undo.next.field}` : 'undo';
-      if (reset) disable(reset, obstacle('reset', control, run));
-      if (pushing) disable(pushing.querySelector('#push'), obstacle('push', control, run));
-      if (moving) disable(moving.querySelector('#move'), obstacle('move', control, run));
+      disable(reset, obstacle('reset', control, run));
       acts.replaceChildren(...actsOf(control).slice(-6).reverse().map((act) => {
         const [what, state] = actText(act);
         return element('li', {class: act.state}, what, element('span', {class: 'text'}, ` ${state}`));

@@ -243,26 +243,18 @@ export class SceneView extends View3D {
     const corners = Array.from({length: count > 0 ? count : 0}, (_, i) =>
       transform(frame, [samples.at(`corner_x[${i}]`, row), samples.at(`corner_y[${i}]`, row), 0.001]));
     this.region.set(known && corners.flat().every(Number.isFinite) ? corners : []);
-    const drop = (object, name, on) => {
-      const at = samples.vector(name, row);
-      object.visible = known && on && at.every(Number.isFinite);
-      if (object.visible) object.position.set(at[0], at[1], at[2] + 0.001);
-    };
-    drop(this.capture, 'capture', true);
-    drop(this.step, 'step', samples.at('step_needed', row) > 0);
-    if (!known) this.marks.measured.visible = false;
-    if (!known) return;
-    place(this.frame, frame);
     const balancing = samples.at('active_x', row) > 0 || samples.at('active_y', row) > 0;
-    const put = (object, name, on = true) => {
-      const cop = samples.vector(name, row, 2);
-      object.visible = on && cop.every(Number.isFinite);
-      if (object.visible) object.position.set(cop[0], cop[1], 0.001);
+    const put = (object, [x, y, z = 0], on = true) => {
+      object.visible = known && on && Number.isFinite(x + y + z);
+      if (object.visible) object.position.set(x, y, z + 0.001);
     };
-    put(this.marks.computed, 'cop');
-    put(this.marks.desired, 'desired_cop', balancing);
+    put(this.capture, samples.vector('capture', row));
+    put(this.step, samples.vector('step', row), samples.at('step_needed', row) > 0);
+    put(this.marks.computed, samples.vector('cop', row, 2));
+    put(this.marks.desired, samples.vector('desired_cop', row, 2), balancing);
+    if (known) place(this.frame, frame);
     const measured = samples.vector('measured_cop', row);
-    this.marks.measured.visible = measured.every(Number.isFinite);
+    this.marks.measured.visible = known && measured.every(Number.isFinite);
     if (this.marks.measured.visible) place(this.measuredFrame, {position: measured, orientation: frame.orientation});
   }
 
