@@ -34,12 +34,8 @@ class Signal {
   largest;
 
   constructor(channel, spec, description) {
-    this.channel = channel;
-    this.field = spec.field;
-    this.integer = spec.integer ?? false;
-    this.name = `${channel.name}.${spec.field}`;
-    this.spec = spec;
-    Object.assign(this, description);
+    const {field, integer = false} = spec;
+    Object.assign(this, {channel, spec, field, integer, name: `${channel.name}.${field}`}, description);
     /** As people read it: joints and feet by their names. */
     this.title = `${channel.name}.${this.label}`;
     if (channel.run.meta.live) this.clear();
@@ -83,11 +79,7 @@ class Channel {
   #ticks = null;
 
   constructor(run, spec, blob) {
-    this.run = run;
-    this.spec = spec;
-    this.name = spec.name;
-    this.type = spec.type;
-    this.blob = blob;
+    Object.assign(this, {run, spec, blob, name: spec.name, type: spec.type});
     /** It has a message in a few ticks only, as of an operator; a channel with gaps has not. */
     this.sparse = spec.sparse
       ?? (spec.ticks !== undefined && (run.meta.live !== undefined || spec.count < FEW * run.numRows));

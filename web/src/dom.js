@@ -18,7 +18,8 @@ export const shape = (tag, attributes = {}, ...children) =>
   filled(document.createElementNS('http://www.w3.org/2000/svg', tag), attributes, children);
 
 /** A button with a text or an icon; `title` stands under the mouse. */
-export const button = (text, title, click, more = {}) => element('button', {type: 'button', title, click, ...more}, text);
+export const button = (text, title, click, more = {}) =>
+  element('button', {type: 'button', title, click, ...more}, text);
 
 /** A button whose text is a sign or short: its title is also what is read aloud. */
 export const signButton = (sign, title, click) => button(sign, title, click, {'aria-label': title});

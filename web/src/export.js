@@ -70,6 +70,7 @@ export function svgOf(panel) {
     return text(content, MARGIN, y, {style: `font: ${font} system-ui, sans-serif`, fill: 'var(--ink)',
       ...(pen.measureText(content).width > room && {textLength: room, lengthAdjust: 'spacingAndGlyphs'})});
   };
+  const look = ({color, dash}) => ({stroke: color(), 'stroke-dasharray': (dash ?? ['none']).join(' ')});
   const rule = (x1, y1, x2, y2, more) => shape('line', {x1, y1, x2, y2, stroke: 'var(--grid)', ...more});
   const ticks = (axis) => axis._splits.map((at, i) => [at, axis._values[i] ?? '']);  // as uPlot has chosen and written them
   const shown = lines.map((line, i) => ({...line, values: data[i + 1], style: styleOf(line.role, line.overlay)}))
@@ -83,9 +84,13 @@ export function svgOf(panel) {
   };
   const curve = (line) => rows(line).flatMap((part) => {
     const points = pointsOf(part, (row) => xAt(data[0][row]), (row) => yAt(line.values[row]));
-    return [shape('polyline', {points: points.join(' '), fill: 'none', stroke: line.style.color(), 'stroke-width': line.style.width,
-      'stroke-dasharray': (line.style.dash ?? ['none']).join(' ')}), ...(line.signal?.channel.sparse || part.length === 1
-      ? points.map((point) => shape('circle', {cx: point.split(',')[0], cy: point.split(',')[1], r: 2.5, fill: line.style.color()})) : [])];
+    const {width, color} = line.style;
+    const dot = (point) => {
+      const [cx, cy] = point.split(',');
+      return shape('circle', {cx, cy, r: 2.5, fill: color()});
+    };
+    return [shape('polyline', {points: points.join(' '), fill: 'none', 'stroke-width': width, ...look(line.style)}),
+      ...(line.signal?.channel.sparse || part.length === 1 ? points.map(dot) : [])];
   });
   const areas = panel.areas().flatMap(([list, color]) => list.filter(({from, to}) => to > min && from < max).map(({from, to}) =>
     shape('rect', {x: xAt(from), y: box.y, width: Math.max(1, xAt(to) - xAt(from)), height: HEIGHT, fill: `var(${color})`})));
@@ -98,8 +103,7 @@ export function svgOf(panel) {
     for (const {label, style} of shown.filter((line) => line.constant === undefined && (line.overlay ?? 0) === k)) {
       const width = SWATCH + pen.measureText(label).width + 2 * MARGIN;
       if (x + width > WIDTH) [x, y] = [MARGIN, y + LINE];
-      legend.push(rule(x, y - 4, x + 22, y - 4, {stroke: style.color(), 'stroke-width': 2, 'stroke-dasharray': (style.dash ?? ['none']).join(' ')}),
-        text(label, x + SWATCH, y));
+      legend.push(rule(x, y - 4, x + 22, y - 4, {'stroke-width': 2, ...look(style)}), text(label, x + SWATCH, y));
       x += width;
     }
     y += LINE + 4;

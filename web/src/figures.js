@@ -7,7 +7,8 @@ const series = (label, role, type, field) => ({label, role, type, field});
 export const DERIVED = 'derived.signals_t';
 const derived = (label, role, field) => series(label, role, DERIVED, field);
 /** A line for each axis of a vector `field`. */
-const ofAxes = (field, type = DERIVED) => ['x', 'y', 'z'].map((axis, i) => series(axis, `axis-${axis}`, type, `${field}[${i}]`));
+const ofAxes = (field, type = DERIVED) =>
+  ['x', 'y', 'z'].map((axis, i) => series(axis, `axis-${axis}`, type, `${field}[${i}]`));
 
 /** Ratios of a sole's wrench to |F_z| that (30)-(33) limit. */
 const CONDITIONS = [
@@ -24,7 +25,8 @@ function comMotion(run, figure, lateral, note = '') {
   // Whoever came late, or has a part of the run, knows no earlier place.
   const origin = run.meta.live ? ' Motion from where it was in the first tick that the viewer heard.'
     : run.firstTick > 0 ? ` Motion from where it was at ${run.start.toFixed(3)} s, the first that this page has.` : '';
-  return {figure, title: lateral ? 'COM motion, lateral (y)' : 'COM motion', unit: 'm', note: (note + origin).trim(), series: lateral
+  const title = lateral ? 'COM motion, lateral (y)' : 'COM motion';
+  return {figure, title, unit: 'm', note: (note + origin).trim(), series: lateral
     ? [derived('estimated', 'computed', 'com_motion[1]'), derived('true', 'truth', 'com_motion_true[1]'),
       derived('desired', 'desired', 'com_motion_desired[1]')]
     : ['x', 'y', 'z'].flatMap((axis, i) => [derived(axis, `axis-${axis}`, `com_motion[${i}]`),
@@ -147,9 +149,11 @@ const torqueDrawn = (run) => (run.find('ground_truth_t', 'joint_torque[0]') ? 't
 /** What every run is looked at for. */
 function common(run, covered) {
   const {bodies, joints, feet} = run.robot;
+  const note = `Drawn: ${torqueDrawn(run)}.`;
+  const share = (joint, i) => derived(joints[joint].name, `hue-${i}`, `torque_share[${joint}]`);
   const legs = feet.map((foot, f) => (
-    {title: `Torques of the ${foot.name} leg, of their limits`, unit: '%', limits: [-100, 100], note: `Drawn: ${torqueDrawn(run)}.`,
-      series: legOf(run.robot, f).map((b) => bodies[b].joint).map((j, i) => derived(joints[j].name, `hue-${i}`, `torque_share[${j}]`))}));
+    {title: `Torques of the ${foot.name} leg, of their limits`, unit: '%', limits: [-100, 100], note,
+      series: legOf(run.robot, f).map((b) => bodies[b].joint).map(share)}));
   const eta = (label, role, field) => series(label, role, 'joint_command_t', field);
   return [
     {title: 'Vertical force of the ground on each foot', unit: 'N', series: ofFeet(run, (foot, f, what) =>

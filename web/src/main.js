@@ -78,13 +78,15 @@ function header(runs, feed, player) {
 
 function sceneToolbar(scene) {
   const box = (name, label) => checkbox(label, scene.show[name], (on) => scene.setShow(name, on));
-  return scene.toolbar(box('forces', 'forces'), box('moments', 'moments'), box('pressure', 'CoP'), box('com', 'COM'), box('steps', 'steps'));
+  return scene.toolbar(box('forces', 'forces'), box('moments', 'moments'), box('pressure', 'CoP'), box('com', 'COM'),
+    box('steps', 'steps'));
 }
 
 /** The picture as a file. */
 function savingToolbar(scene, {run, player}) {
   const name = () => `${run.meta.run.scenario} ${player.time.toFixed(3)} s`;
-  return element('div', {class: 'toolbar saving'}, scene.pngButton(name), videoButton(scene, player, (blob) => saveNamed(name(), 'webm', blob)));
+  return element('div', {class: 'toolbar saving'}, scene.pngButton(name),
+    videoButton(scene, player, (blob) => saveNamed(name(), 'webm', blob)));
 }
 
 /** What the regions about the standing foot leave out. */
@@ -197,7 +199,8 @@ async function start() {
     document.getElementById('player').prepend(acting.stop);
     followOwnActs(control, player);
     if (drawn) {
-      player.addEventListener('time', grabbing(scene, control, () => control.can('push') && player.following && feed.state === 'live'));
+      const mayPush = () => control.can('push') && player.following && feed.state === 'live';
+      player.addEventListener('time', grabbing(scene, control, mayPush));
     }
     control.catchUp();
   }

@@ -36,7 +36,8 @@ const DASHES = {curve: [undefined, (k) => [3 * k, 3]], desired: [[5, 3], (k) => 
 export function styleOf(role, index = 0) {
   const name = role.replace(/-thin$/, '').replace(/\d+$/, (hue) => hue % HUES);
   const kind = name === 'limit' ? 'limit' : name === 'desired' || /^foot-.*-computed$/.test(name) ? 'desired' : 'curve';
-  return {color: () => colorNow(name in COLORS ? name : 'computed'), dash: index ? DASHES[kind][1](index) : DASHES[kind][0], width: role.endsWith('-thin') || index ? 1 : 1.5};
+  return {color: () => colorNow(name in COLORS ? name : 'computed'),
+    dash: index ? DASHES[kind][1](index) : DASHES[kind][0], width: role.endsWith('-thin') || index ? 1 : 1.5};
 }
 
 export const cssColor = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();

@@ -229,7 +229,7 @@ class Panel {
           }
           u.setSelect({left: 0, top: 0, width: 0, height: 0}, false);
         }],
-        setCursor: [(u) => this.#updateValues(u.cursor.idx ?? null)],
+        setCursor: [(u) => this.updateValues(u.cursor.idx ?? null)],
       },
     }, this.data, this.host);
     const over = this.plot.over;
@@ -263,7 +263,7 @@ class Panel {
           this.hide(this.hidden.has(line.label) ? others : [...others, line.label]);
         }}, swatch, line.label, this.values[i]);
     }).filter(Boolean));
-    this.#updateValues(null);
+    this.updateValues(null);
   }
 
   /** Hides the lines of these labels, and shows the others. */
@@ -277,7 +277,7 @@ class Panel {
   }
 
   /** Values in the row under the pointer, else at the time cursor: the signals', which a plot that has still to grow lacks. */
-  #updateValues(index) {
+  updateValues(index = this.plot?.cursor.idx ?? null) {
     if (!this.values) return;
     const {run, player} = this.shared;
     const at = index === null ? player.row : this.firstTick + index - run.firstTick;
@@ -287,7 +287,8 @@ class Panel {
       const row = line.run.rowOf(run.timeAt(at));
       const value = channel.sparse ? lastNumber(values, row) : values[row] ?? NaN;
       const name = integer ? valueNames?.[value] : undefined;
-      this.values[i].textContent = name !== undefined ? `${value} ${name}` : quantity(value, this.unitOf(line), 4, !this.definition.added);
+      this.values[i].textContent = name !== undefined ? `${value} ${name}`
+        : quantity(value, this.unitOf(line), 4, !this.definition.added);
     });
   }
 
@@ -329,10 +330,6 @@ class Panel {
     this.cursor.hidden = !(time >= min && time <= max);
     if (this.cursor.hidden) return;
     this.cursor.style.transform = `translateX(${this.plot.valToPos(time, 'x')}px)`;
-  }
-
-  updateValues() {
-    if (this.plot) this.#updateValues(this.plot.cursor.idx ?? null);
   }
 
   /** After a zoom, or when the run has grown. */

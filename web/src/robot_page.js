@@ -132,7 +132,8 @@ export function robotPage(data) {
   const still = drawn3d ? new StillView(host, data) : new NoPicture(host);
   const box = (name, label) => checkbox(label, true, (on) => still.show(name, on));
   if (drawn3d) {
-    host.append(still.toolbar(box('frames', 'frames'), box('axes', 'joint axes'), box('soles', 'soles'), still.pngButton(() => check.name)));
+    host.append(still.toolbar(box('frames', 'frames'), box('axes', 'joint axes'), box('soles', 'soles'),
+      still.pngButton(() => check.name)));
   }
   const [drawn, inFiles] = data.triangles;
   const notes = [data.drawn_instead, drawn < inFiles ? `Of the meshes' ${inFiles} triangles ${drawn} are drawn.` : ''].filter(Boolean);

@@ -5,11 +5,10 @@ export class Samples {
   #signals = new Map();
 
   async load(run, wanted) {
-    const found = Object.entries(wanted).map(([name, [type, field]]) => [name, run.find(type, field)]);
-    await Promise.all(found.filter(([, s]) => s).map(([name, s]) => {
-      this.#signals.set(name, s);
-      return s.load();
-    }));
+    const found = Object.entries(wanted).map(([name, [type, field]]) => [name, run.find(type, field)])
+      .filter(([, signal]) => signal);
+    this.#signals = new Map(found);
+    await Promise.all(found.map(([, s]) => s.load()));
   }
 
   at(name, row) { return this.#signals.get(name)?.values?.[row] ?? NaN; }

@@ -1,5 +1,5 @@
 // Every signal can be found and added as a plot.
-import {element} from './dom.js';
+import {button, element} from './dom.js';
 import {lineOf, panelOf} from './figures.js';
 
 const MOST_RESULTS = 40;
@@ -54,8 +54,7 @@ export function signalSearch(run, grid) {
       element('span', {class: 'name', title: signal.name}, signal.title), signal.unit ? element('span', {class: 'unit'}, signal.unit) : '',
       element('span', {class: 'text'}, signal.text ?? '')),
     last && grid.panels.includes(last) && last.definition.unit === signal.unit
-      ? element('button', {type: 'button', title: 'Add to the plot that was added last', click: () => addLine(signal)},
-        'into last') : '');
+      ? button('into last', 'Add to the plot that was added last', () => addLine(signal)) : '');
   const update = () => {
     found = searchSignals(run.signals.values(), input.value);
     results.hidden = input.value.trim() === '';

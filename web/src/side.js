@@ -47,7 +47,8 @@ function rowsOf(run) {
   const feet = run.robot.feet.map((foot) => foot.name);
   return [
     ['phase', [run.find('planner_status_t', 'phase')], ([i]) => run.scenario.step_planner?.phase?.[i]?.name ?? formatNumber(i)],
-    named('plan', 'support_plan_t', 'status'), named('controller', 'task_torque_t', 'status'), named('bridge', 'bridge_status_t', 'state'),
+    named('plan', 'support_plan_t', 'status'), named('controller', 'task_torque_t', 'status'),
+    named('bridge', 'bridge_status_t', 'state'),
     ['η', [run.find('joint_command_t', 'eta')], ([v]) => formatNumber(v, DIGITS)],
     ['CoP computed x, y', ['cop[0]', 'cop[1]'].map((f) => run.find('balance_torque_t', f)), metres],
     [`CoP ${measuredName(run)} x, y`, derived('cop_measured[0]', 'cop_measured[1]'), metres],

@@ -71,16 +71,14 @@ export class StepsView {
     const {feet} = run.robot;
     this.prints = feet.map((foot, f) => new Prints(FOOT_COLORS[f], foot.corners));
     this.labels = Array.from({length: LABELLED}, () => new Label());
-    this.planned = AHEAD.map((opacity) => {
-      const outline = new Outline(0, Math.max(...feet.map((foot) => foot.corners.length)) + 1, true);
-      outline.material.opacity = opacity;
-      return outline;
-    });
-    this.regions = WITHIN.map((opacity, steps) => {
-      const outline = new Outline(0, 17, steps > 0);
-      outline.material.opacity = opacity;
-      return colored(outline, 'reach');
-    });
+    const outline = (opacity, ...more) => {
+      const result = new Outline(0, ...more);
+      result.material.opacity = opacity;
+      return result;
+    };
+    const mostCorners = Math.max(...feet.map((foot) => foot.corners.length));
+    this.planned = AHEAD.map((opacity) => outline(opacity, mostCorners + 1, true));
+    this.regions = WITHIN.map((opacity, steps) => colored(outline(opacity, 17, steps > 0), 'reach'));
     this.trail = growing(TRACE_POINTS);
     this.trace = colored(new Line(new BufferGeometry().setAttribute('position', this.trail),
       new LineBasicMaterial({depthTest: false, transparent: true, opacity: 0.8})), 'capture');

@@ -119,19 +119,17 @@ function verdictBadge(run) {
     + (unknown.length ? `, ${unknown.length} not known` : ''));
 }
 
-/** "fell at 0.810 s"; '' of a robot that did not. */
-function fallBadge(events) {
-  const fall = events.find((e) => e.name === 'fall');
-  return fall ? element('span', {class: 'badge failed'}, `fell at ${fall.time.toFixed(3)} s`) : '';
-}
-
 /** What is known of the run's end: of a run in progress, what its feed says. */
 export function stateBadges(run, feed) {
-  const badge = (text) => element('span', {class: 'badge'}, text);
+  const badge = (text, kind = '') => element('span', {class: `badge ${kind}`}, text);
+  const fallBadge = (events) => {
+    const fall = events.find((e) => e.name === 'fall');
+    return fall ? badge(`fell at ${fall.time.toFixed(3)} s`, 'failed') : '';
+  };
   if (!feed) return [partOf(run) ? badge(partOf(run)) : '', fallBadge(run.meta.events ?? []), verdictBadge(run)];
   const {status, state, control} = feed;
   if (status.ended) return [fallBadge(status.events), status.problem ? badge('ended; its checks cannot be told') : verdictBadge(run)];
-  if (control?.run?.ended) return [element('span', {class: `badge ${control.run.detail ? 'failed' : ''}`}, endText(control.run))];
+  if (control?.run?.ended) return [badge(endText(control.run), control.run.detail ? 'failed' : '')];
   return [badge({connecting: 'connecting', live: 'in progress', ended: 'ended; its log is being checked',
     waiting: 'connection lost: whether it goes on is not known'}[state])];
 }

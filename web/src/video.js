@@ -1,5 +1,5 @@
 // The picture as a video, while the run plays.
-import {element} from './dom.js';
+import {button} from './dom.js';
 
 const FRAMES = 30;   // a second
 const BITS = 8e6;    // a second
@@ -30,11 +30,11 @@ export function videoButton(scene, player, save) {
     scene.renderNow();  // the first picture belongs to it, and the last one below
   };
   const against = reasonAgainst(scene.canvas);
-  const button = element('button', {type: 'button', disabled: against !== '', title: against || 'Play the run and record the picture as WebM',
-    click: () => (recorder ? player.pause() : start())});
+  const record = button('', against || 'Play the run and record the picture as WebM',
+    () => (recorder ? player.pause() : start()), {disabled: against !== ''});
   const update = () => {
     scene.recorded = recorder !== undefined;
-    button.textContent = recorder ? 'Stop and save the video' : 'Video';
+    record.textContent = recorder ? 'Stop and save the video' : 'Video';
   };
   player.addEventListener('state', () => {
     if (player.playing || recorder?.state !== 'recording') return;
@@ -42,5 +42,5 @@ export function videoButton(scene, player, save) {
     requestAnimationFrame(() => recorder?.stop());
   });
   update();
-  return button;
+  return record;
 }

@@ -65,10 +65,18 @@ const drawCross = (ctx, x, y, k, r = 3.5 * k) => stroke(ctx, cssColor('--failed'
   segment(ctx, [x - r, y + r], [x + r, y - r]);
 });
 
-const drawRing = (ctx, x, y, k) => stroke(ctx, cssColor('--ink-soft'), 2 * k, [3 * k, 2 * k], () => circle(ctx, x, y, 4 * k));
+const drawRing = (ctx, x, y, k) =>
+  stroke(ctx, cssColor('--ink-soft'), 2 * k, [3 * k, 2 * k], () => circle(ctx, x, y, 4 * k));
 
 const drawPaperLine = (ctx, from, to, y, k) =>
   stroke(ctx, cssColor('--event'), 1.5 * k, [6 * k, 4 * k], () => segment(ctx, [from, y], [to, y]));
+
+/** What says that a mark has no value of the scale, or of a cell that a part of its runs has none. */
+function drawState(ctx, mark, x, y, k) {
+  if (mark.state === 'untold') drawRing(ctx, x, y, k);
+  else if (mark.state === 'fell') drawCross(ctx, x, y, k);
+  else if (mark.someFell) drawCross(ctx, x, y, k, 2.5 * k);
+}
 
 /** A mark's outline, filled. */
 function drawShape(ctx, set, x, y, k, color) {
@@ -279,9 +287,8 @@ export class Chart {
 
   /** A mark without a value of the scale, or with one. */
   #mark(ctx, mark, x, y, k, color) {
-    if (mark.state === 'fell') drawCross(ctx, x, y, k);
-    else if (mark.state === 'untold') drawRing(ctx, x, y, k);
-    else drawShape(ctx, mark.set, x, y, k, color);
+    if (mark.state === 'value') drawShape(ctx, mark.set, x, y, k, color);
+    else drawState(ctx, mark, x, y, k);
     this.spots.push({mark, x, y});
   }
 
@@ -315,13 +322,6 @@ export class Chart {
     }
   }
 
-  /** What a cell without a value of the scale, or with a part of its runs, has in its middle. */
-  #inCell(ctx, mark, x, y, k) {
-    if (mark.state === 'untold') drawRing(ctx, x, y, k);
-    else if (mark.state === 'fell') drawCross(ctx, x, y, k);
-    else if (mark.someFell) drawCross(ctx, x, y, k, 2.5 * k);
-  }
-
   #fill(ctx, mark) {
     ctx.fillStyle = mark.state === 'value' ? colorOf(this.chart, mark.value) : cssColor(mark.state === 'fell' ? '--fallen' : '--grid');
     ctx.fill();
@@ -337,7 +337,7 @@ export class Chart {
       ctx.rect(left, top, right - left + 0.3, bottom - top + 0.3);
       this.#fill(ctx, mark);
       const [x, y] = [(left + right) / 2, (top + bottom) / 2];
-      this.#inCell(ctx, mark, x, y, k);
+      drawState(ctx, mark, x, y, k);
       this.spots.push({mark, x, y, holds: (px, py) => px >= left && px < right && py >= top && py < bottom});
     }
   }
@@ -409,7 +409,7 @@ export class Chart {
       this.#fill(ctx, mark);
       const middle = phi((begin + end) / 2), radius = (inner + outer) / 2;
       const [x, y] = [center[0] + radius * Math.cos(middle), center[1] + radius * Math.sin(middle)];
-      this.#inCell(ctx, mark, x, y, k);
+      drawState(ctx, mark, x, y, k);
       this.spots.push({mark, x, y, holds: (px, py) => {
         const r = Math.hypot(px - center[0], py - center[1]);
         const degrees = Math.atan2(center[0] - px, center[1] - py) / RADIANS;

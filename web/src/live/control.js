@@ -4,9 +4,7 @@ const HOLD = 0.15;        // s that one push lasts: the hand lets go by itself w
 const FULL_REACH = 0.4;   // m from the grabbed point to the cursor at which a drag asks for the largest force
 
 /** How an interactive run has ended: as planned, or why. */
-export function endText({detail}) {
-  return detail ? `ended: ${detail}` : 'ended as planned';
-}
+export const endText = ({detail}) => (detail ? `ended: ${detail}` : 'ended as planned');
 
 /** Of the robot's answers; fires 'change' when they have, 'answer' with {detail: act} for an act of this page. */
 export class Control extends EventTarget {
@@ -108,7 +106,9 @@ export class Undo {
     this.control = control;
     this.before = new Map();  // by field, in force
     control.addEventListener('change', () => this.#look());
-    control.addEventListener('answer', ({detail}) => { if (detail.state === 'refused' && detail.id === this.#undoing) this.#undoing = 0; });
+    control.addEventListener('answer', ({detail: {state, id}}) => {
+      if (state === 'refused' && id === this.#undoing) this.#undoing = 0;
+    });
   }
 
   get next() { return this.#stack.at(-1); }

@@ -32,7 +32,8 @@ function disable(control, why) {
 
 const select = (label, options, more = {}) =>
   element('select', {'aria-label': label, ...more}, ...options.map((option) => element('option', {}, option)));
-const numberInput = (label, value, more = {}) => element('input', {type: 'number', step: 'any', min: 0, 'aria-label': label, value, ...more});
+const numberInput = (label, value, more = {}) =>
+  element('input', {type: 'number', step: 'any', min: 0, 'aria-label': label, value, ...more});
 
 /** {element, update}: a form that sends an act `what` with what `told()` says of it. */
 function actForm(control, run, what, label, told, ...inputs) {
@@ -90,8 +91,9 @@ function pushForm(control, run) {
   const direction = select('Direction', Object.keys(DIRECTIONS));
   const force = numberInput('Force, N', Math.round(PUSH_SHARE * limit), {max: limit});
   const duration = numberInput('Duration, s', PUSH_DURATION, {min: 0.002, max: longest});
-  return actForm(control, run, 'push', 'Push', () => ({body: body.value, point: [0, 0, 0], duration: Number(duration.value),
-    force: DIRECTIONS[direction.value].map((x) => x * Number(force.value))}), body, direction, force, 'N', duration, 's');
+  const told = () => ({body: body.value, point: [0, 0, 0], duration: Number(duration.value),
+    force: DIRECTIONS[direction.value].map((x) => x * Number(force.value))});
+  return actForm(control, run, 'push', 'Push', told, body, direction, force, 'N', duration, 's');
 }
 
 /** Sends a joint that no leg needs to an angle. */
@@ -106,8 +108,8 @@ function moveForm(control, run) {
     angle.value = Math.min(high, Math.max(low, Number(angle.value)));
   };
   show();
-  return actForm(control, run, 'move', 'Move', () => ({joint: joint.value, value: Number(angle.value), duration: Number(duration.value)}),
-    joint, angle, 'rad', duration, 's');
+  const told = () => ({joint: joint.value, value: Number(angle.value), duration: Number(duration.value)});
+  return actForm(control, run, 'move', 'Move', told, joint, angle, 'rad', duration, 's');
 }
 
 /** Pad, sliders and buttons of a walk, and single steps; what this run cannot do is grey, and says why. */
@@ -160,7 +162,8 @@ function pace(control, player, run) {
   const go = button('', '', () => control.act(control.standing.run.paused ? 'go' : 'pause'), {id: 'go'});
   const tick = button('one tick', 'Run one tick (.)', () => control.act('tick', {ticks: 1}), {id: 'one-tick'});
   const speed = element('select', {id: 'run-speed', 'aria-label': 'Speed of the run',
-    change: () => control.act('speed', {value: Number(speed.value)})}, ...SPEEDS.map((s) => element('option', {value: s}, `${s}×`)));
+    change: () => control.act('speed', {value: Number(speed.value)})},
+  ...SPEEDS.map((s) => element('option', {value: s}, `${s}×`)));
   const back = button('back to the cursor', 'Back to the tick at the time cursor, and on from there',
     () => control.act('back', {ticks: player.tick}), {id: 'back'});
   const again = button('start again', 'The run begins anew, with the settings that it began with, and goes on; what was is kept as a branch',
@@ -217,7 +220,8 @@ export function controlPanel(control, shared) {
     const {standing} = control;
     const rows = (standing.settings ?? []).map((setting) => new SettingRow(control, setting));
     const undoButton = button('undo', 'Take the last change back (u)', () => undo.undo(), {id: 'undo'});
-    const dragged = {element: element('p', {class: 'soft'}, `Drag the robot to push it, up to ${formatNumber(standing.push_limit, 3)} N.`)};
+    const limit = formatNumber(standing.push_limit, 3);
+    const dragged = {element: element('p', {class: 'soft'}, `Drag the robot to push it, up to ${limit} N.`)};
     const parts = [
       [control.can('pause'), () => [pace(control, player, run)], ['pause', 'go', 'tick', 'speed', 'back', 'restart']],
       [control.can('push'), () => [dragged, pushForm(control, run)], ['push']],
@@ -236,7 +240,7 @@ export function controlPanel(control, shared) {
     host.replaceChildren(element('h2', {}, 'Control'), lag, ...parts.map((part) => part.element), acts);
     settings.replaceChildren(...(rows.length > 0 ? [element('details', {class: 'settings', open: true}, element('summary', {}, `${rows.length} settings`),
       element('div', {class: 'line'}, filter, undoButton), ...rows.map((row) => row.element))] : []));
-    stopHost.replaceChildren(...(control.can('stop') ? [estop] : []), ...(control.can('reset') ? [reset] : []), stopAnswer.element);
+    stopHost.replaceChildren(control.can('stop') ? estop : '', control.can('reset') ? reset : '', stopAnswer.element);
     host.hidden = false;
     update = () => {
       for (const part of [...rows, ...parts, stopAnswer]) part.update?.();

@@ -9,8 +9,8 @@ import {colorNow} from '../palette.js';
 const METRES_PER_NEWTON = 1 / 600;
 
 /**
- * Lets the mouse pull the robot of `scene`; `mayPush`: whether a drag on it is one now. Gives what shows the pull with the pose that is
- * shown now.
+ * Lets the mouse pull the robot of `scene`; `mayPush`: whether a drag on it is one now. Gives what shows the pull with
+ * the pose that is shown now.
  */
 export function grabbing(scene, control, mayPush) {
   const hand = new Hand(control);
@@ -88,7 +88,8 @@ export function grabbing(scene, control, mayPush) {
     arrow.set(grabbed.toArray(), force.map((f) => f * METRES_PER_NEWTON));
     const {samples, row} = scene;
     const inForce = control.standing.push?.force ?? [0];
-    number.textContent = `asked ${formatForce(force)}, in force ${formatForce(inForce)}, measured ${formatForce(samples.vector('push', row))}`;
+    const [asked, applied, measured] = [force, inForce, samples.vector('push', row)].map(formatForce);
+    number.textContent = `asked ${asked}, in force ${applied}, measured ${measured}`;
     scene.draw();
   };
 

@@ -192,9 +192,7 @@ export class LiveFeed extends EventTarget {
     if (this.state === 'live' && this.#allHasCome()) this.#setState('ended');
   }
 
-  #allHasCome() {
-    return this.run.firstTick + this.run.numRows >= this.#ticks;
-  }
+  #allHasCome() { return this.run.firstTick + this.run.numRows >= this.#ticks; }
 
   #setState(state) {
     this.state = state;

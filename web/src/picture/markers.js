@@ -8,11 +8,13 @@ import {BLOCK_CORNERS, blockTop} from '../spatial.js';
 
 const UP = new Vector3(0, 1, 0);
 const OVERLAY_ORDER = 10;
+const LEAST_ARROW = 0.005;  // m: a shorter one is hidden
 
 /** Geometry of points, three `numbers` each. */
-export const geometryOf = (numbers) => new BufferGeometry().setAttribute('position', new Float32BufferAttribute(numbers, 3));
+export const geometryOf = (numbers) =>
+  new BufferGeometry().setAttribute('position', new Float32BufferAttribute(numbers, 3));
 
-/** Triangles, of three points each, of a top of four corners, anticlockwise from above, and of its walls down to the height `bottom`. */
+/** Triangles, three points each, of a top of four corners, anticlockwise from above, and of walls down to `bottom`. */
 export function prism(top, bottom) {
   const quad = (a, b, c, d) => [a, b, c, a, c, d];
   return [...quad(...top), ...top.flatMap((a, i) => {
@@ -37,11 +39,10 @@ export class Arrow {
     this.object.children.forEach((mesh) => { mesh.renderOrder = OVERLAY_ORDER; });
   }
 
-  /** Hidden when shorter than `least` m. */
-  set(from, vector, least = 0.005) {
+  set(from, vector) {
     direction.set(...vector);
     const length = direction.length();
-    this.object.visible = length > least && Number.isFinite(length);
+    this.object.visible = length > LEAST_ARROW && Number.isFinite(length);
     if (!this.object.visible) return;
     this.object.position.set(...from);
     this.object.quaternion.setFromUnitVectors(UP, direction.divideScalar(length));

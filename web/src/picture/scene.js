@@ -40,7 +40,8 @@ function motionSignals(run) {
 }
 
 const wrench = (kind, f, type) => ({...vector(`${kind}${f}.force`, type, `foot_wrench[${f}].force`),
-  ...vector(`${kind}${f}.moment`, type, `foot_wrench[${f}].moment`), ...vector(`${kind}${f}.cop`, DERIVED, `foot[${f}].cop_${kind}`, 2)});
+  ...vector(`${kind}${f}.moment`, type, `foot_wrench[${f}].moment`),
+  ...vector(`${kind}${f}.cop`, DERIVED, `foot[${f}].cop_${kind}`, 2)});
 
 function contactSignals(run) {
   const truth = run.find('ground_truth_t', 'foot_pose[0].position[0]');
@@ -128,7 +129,8 @@ export class SceneView extends View3D {
     this.marks.measured.position.z = 0.001;
     this.measuredFrame.add(this.marks.measured);
     this.comMark = flat('cross', 'com', 0.014);
-    this.com = colored(new Mesh(new SphereGeometry(0.022, 20, 14), new MeshBasicMaterial({depthTest: false, transparent: true})), 'com');
+    this.com = colored(new Mesh(new SphereGeometry(0.022, 20, 14),
+      new MeshBasicMaterial({depthTest: false, transparent: true})), 'com');
     this.com.renderOrder = 9;
     const flats = [this.frame, this.measuredFrame, this.comMark, this.capture, this.step, this.polygon.object, this.region.object,
       ...this.soles.map((s) => s.object)];
@@ -172,7 +174,8 @@ export class SceneView extends View3D {
     this.com.visible = this.comMark.visible = show.com && com.every(Number.isFinite);
     if (this.com.visible) {
       this.com.position.set(...com);
-      this.comMark.position.set(com[0], com[1], this.#groundHeight(row) + 0.001);
+      const ground = samples.at('frame.position[2]', row);
+      this.comMark.position.set(com[0], com[1], (Number.isFinite(ground) ? ground : 0) + 0.001);
     }
     const force = samples.vector('push', row);
     const point = samples.vector('point', row);
@@ -203,11 +206,6 @@ export class SceneView extends View3D {
     const square = GRID * PIECE;
     this.ground.position.set(x, y, 0);
     this.grid.position.set(Math.round(x / square) * square, Math.round(y / square) * square, 0);
-  }
-
-  #groundHeight(row) {
-    const z = this.samples.at('frame.position[2]', row);
-    return Number.isFinite(z) ? z : 0;
   }
 
   #setFeet(row) {

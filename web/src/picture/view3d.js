@@ -88,7 +88,8 @@ export class View3D {
 
   /** A button for each of VIEWS, and `more`. */
   toolbar(...more) {
-    return element('div', {class: 'toolbar'}, ...Object.keys(VIEWS).map((name) => button(name, null, () => this.look(name))), ...more);
+    const looks = Object.keys(VIEWS).map((name) => button(name, null, () => this.look(name)));
+    return element('div', {class: 'toolbar'}, ...looks, ...more);
   }
 
   /** Saves the picture as a file called `name()`. */
