@@ -39,8 +39,9 @@ async function drag(page, name, pixels = 25) {
   const seenThen = await until(page, () => {
     const {control, scene} = window.poise;
     const force = control.standing.push?.force;
+    const text = document.querySelector('output.force').innerText;
     return force && Math.hypot(...scene.samples.vector('push', scene.row)) > 0.5 * Math.hypot(...force) && Math.hypot(...force) > 5
-      && {force, limit: control.standing.push_limit, text: document.querySelector('output.force').innerText};
+      && /measured \d/.test(text) && {force, limit: control.standing.push_limit, text};
   });
   const {force, limit, text} = await seenThen.jsonValue();
   assert.match(text, /asked \d+ N, in force \d+ N, measured \d+ N/);
