@@ -90,7 +90,7 @@ class Supervisor {
     return state_ >= bridge_status_t::STATE_ENABLING && state_ <= bridge_status_t::STATE_DAMPING;
   }
   void Enter(int8_t state, int8_t reason, int joint = -1);
-  /// Likewise a state of a stop, which is left only by a reset.
+  /// Enters a state of a stop, which only a reset leaves.
   void Latch(int8_t state, int8_t reason, int joint = -1);
   void CheckDrives(const drive_feedback_t& feedback, std::span<const DriveReport> reports);
   void CheckMotion(const drive_feedback_t& feedback);

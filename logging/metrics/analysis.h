@@ -38,7 +38,7 @@ class Mean {
   Answer Value() const {
     return count_ > 0 ? Answer(sum_ / static_cast<double>(count_)) : Answer();
   }
-  /// Of squares: their root mean square.
+  /// The root of the mean; where squares were added, their root mean square.
   Answer Root() const { return count_ > 0 ? Answer(std::sqrt(*Value())) : Answer(); }
 
  private:
