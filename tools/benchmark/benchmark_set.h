@@ -16,8 +16,8 @@ struct BenchmarkSubject {
   std::string graph;  ///< name or file; empty: the controller's file's, or Poise's own
   std::string
       controller;  ///< a scenario's text with `graph` and its components' fields; empty: none
-  /// Robot, engine (empty: the graph's), drives; and of the controller the components' fields,
-  /// parts left out, the variant of its file.
+  /// A subject sets robot, world (empty: the graph's engine) and drives, and changes the controller
+  /// by set, without and variant. All else stays as it is: the benchmark says it.
   RunChanges changes;
 
   BenchmarkSubject() { changes.robot = "dyros/dyros_legs"; }
@@ -38,9 +38,9 @@ struct BenchmarkRobot {
 
 class BenchmarkSet {
  public:
-  /// `name`: of deploy/benchmarks, or a file. Throws ConfigError: no such file, a base or a change
-  /// of it that cannot be, a part that is not whole, a controller that changes what is the
-  /// benchmark's. RobotError.
+  /// `name`: of deploy/benchmarks, or a file. Throws RobotError, or ConfigError: no such file, a
+  /// base or a change of it that cannot be, a part that is not whole, a controller that changes
+  /// what is the benchmark's.
   BenchmarkSet(const std::string& name, const BenchmarkSubject& subject);
 
   const Benchmark& benchmark() const { return benchmark_; }

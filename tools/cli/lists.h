@@ -1,4 +1,4 @@
-// Small questions to lists and texts.
+// What many files do with lists and texts.
 #pragma once
 
 #include <algorithm>
@@ -45,7 +45,7 @@ inline std::vector<std::string> Split(std::string_view text, char at) {
   }
 }
 
-/// "a, b, c" of {"a", "b", "c"} and ", ". Not fmt::join, which GCC 12 misreads.
+/// "a, b, c" of {"a", "b", "c"} and ", ". Not fmt::join, which GCC 12 misreads in some callers.
 inline std::string Joined(const std::vector<std::string>& parts, std::string_view separator) {
   std::string text;
   for (const std::string& part : parts) {

@@ -36,7 +36,7 @@ struct BenchmarkArguments {
 std::string CommandLine() {
   const std::vector<std::string> words = Split(ReadFile("/proc/self/cmdline"), '\0');
   std::string command = "poise";
-  // The program's path comes first, and nothing behind the last zero.
+  // The program's path comes first; nothing comes behind the last zero.
   for (size_t i = 1; i + 1 < words.size(); ++i) command += " " + ShellWord(words[i]);
   return command;
 }
@@ -78,6 +78,7 @@ void CheckSame(const SweepDefinition& definition, const fs::path& place) {
 }
 
 int RunBenchmark(const BenchmarkArguments& arguments) {
+  const std::string command_line = CommandLine();  // what fails here loses no hour's work
   const BenchmarkSet set(arguments.set, arguments.subject);
   const Benchmark& benchmark = set.benchmark();
   CheckParts(benchmark, arguments.parts);
@@ -138,7 +139,7 @@ int RunBenchmark(const BenchmarkArguments& arguments) {
     all_ran = AllRan(rows) && all_ran;
     results.push_back({parts[i], session.header(), std::move(rows)});
   }
-  const std::string sha1 = WriteBenchmark(folder, set, results, arguments.quick, CommandLine());
+  const std::string sha1 = WriteBenchmark(folder, set, results, arguments.quick, command_line);
   fmt::print("\n{}\n", FormatBenchmark(results));
   for (const char* file : {kBenchmarkCsv, kChartsPage, kBenchmarkJson}) {
     fmt::print("{}\n", (folder / file).string());

@@ -130,7 +130,7 @@ void AddRunCommand(CLI::App* app, Command* command) {
                 "may not fit the disk");
   run->add_flag("--quiet", options->quiet, "only errors and the verdict, in one line");
   run->add_flag("--full", options->full, "every figure, the events and the assumptions");
-  // The help tells at each flag what it goes with and what not.
+  // CLI11 checks these, and its help names them at each flag.
   using Flags = std::initializer_list<const char*>;
   const auto exclude = [app = run](const char* excluded, Flags flags) {
     for (const char* const flag : flags) app->get_option(flag)->excludes(app->get_option(excluded));

@@ -30,7 +30,7 @@ std::string CsvValue(const Scalar& scalar) {
   return std::visit(Format{"{}", "\"\""}, scalar.value);
 }
 
-/// One cell a field, in front the tick, if there is one, unless it is among them.
+/// Writes one cell for each field. `tick` (empty: none) stands in front unless it is among them.
 template <class Cell>
 std::string Row(const std::string& tick, const std::vector<Scalar>& fields, char separator,
                 Cell cell) {

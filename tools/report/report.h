@@ -46,7 +46,7 @@ int64_t FirstCheckedTick(const Scenario& scenario, const logging::RunRecord& run
 
 /// The scenario's checks on a run, after those of every run: it reached its planned end, so did
 /// its reference, its log is whole, and each component did its work. Throws ConfigError for a check
-/// without a metric of its name.
+/// whose metric does not exist.
 std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging::RunRecord& run);
 
 /// A line for each figure that is not known: what it needs. `all`: those without a limit, too.

@@ -8,7 +8,8 @@
 
 namespace poise {
 
-/// Shows in `line`, from now on, how far `log` is made again, and stops at a stop signal.
+/// Returns what shows in `line` how far `log` is made again, and stops at a stop signal. `line`
+/// outlives it.
 logging::OnTick ShowRemake(const std::filesystem::path& log, StatusLine* line);
 
 /// Makes `log` again from run.packed beside it, and says so. Throws LogError.

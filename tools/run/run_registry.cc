@@ -87,8 +87,8 @@ void Retire(const fs::path& file, const struct stat& status) {
   if (!newer || rename(file.c_str(), ended.c_str()) != 0) unlink(file.c_str());
 }
 
-/// Adds the run in `dir` unless it is among them. `status`: of what is the user's whose run it is,
-/// and as old as the run.
+/// Adds the run in `dir` unless it is among them. `status` is that of a file or folder which belongs
+/// to the run's user and whose time is the run's start.
 void AddRun(const fs::path& dir, const struct stat& status, std::vector<RunningRun>* runs) {
   const auto known = [&](const RunningRun& other) { return other.dir == dir; };
   if (dir.empty() || std::ranges::any_of(*runs, known)) return;

@@ -22,8 +22,8 @@ std::vector<std::string> ExpandScenarios(const std::vector<std::string>& names);
 /// `name`, or with -2, -3, ... at its end when it is taken; then in `taken`.
 std::string UniqueName(const std::string& name, std::set<std::string>* taken);
 
-/// Runs one scenario into `out` (empty: a dated folder, where runs/latest then points). Of several,
-/// one after the other, each has a folder of its own below `out` (MakeRunDir's rules), and an
+/// Runs one scenario into `out` (empty: a dated folder, where runs/latest then points). Several run
+/// one after the other, each in a folder of its own below `out` (MakeRunDir's rules), and an
 /// overview follows: verdicts, and the measured figures beside the paper's. runs/latest points to
 /// each in turn. One that cannot be run has failed, and the others go on; a stop signal ends the
 /// run and the rest. Gives the exit code. Throws as ScenarioRun does; nothing has run then.

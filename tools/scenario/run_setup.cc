@@ -131,7 +131,7 @@ void ConnectWhere(const Scenario& scenario, ComponentInstance* instance, Graph* 
     const auto output = std::ranges::find(outputs, optional.port, &Connection::port);
     if (wanted && output == outputs.end()) {
       const std::string name = InCapitals(optional.port);
-      if (!IsAmong(name, NamesOf(channels))) {
+      if (std::ranges::find(channels, name, &Channel::name) == channels.end()) {
         Channel* const channel = graph->add_channel();
         channel->set_name(name);
         channel->set_type(optional.type);

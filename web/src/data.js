@@ -66,7 +66,7 @@ class Signal {
     this.#column.append(values, dropped, this.channel.run.keep);
   }
 
-  /** Has no values, and none to load: of a run that grows from here. */
+  /** Lets go of all values and has none to load: the run grows from here. */
   clear() {
     this.#column = new Column(this.integer ? new Float64Array(0) : new Float32Array(0));
     this.#loading = Promise.resolve();
@@ -152,7 +152,7 @@ export class Run extends EventTarget {
     this.restarts = 0;
     this.signals = new Map();
     const joints = meta.robot.joints.map((joint) => joint.name);
-    // Of the elements of lists, by their count in a message; motors stand in the order of the joints that they drive.
+    // A count in a message tells whose names a list's elements have; motors stand in the order of the joints they drive.
     const names = {num_joints: joints, num_motors: joints, num_feet: meta.robot.feet.map((foot) => foot.name)};
     const known = {...messages, ...Object.fromEntries((meta.messages ?? []).map(parseMessage).map((m) => [m.name, m]))};
     this.channels = meta.channels.map((spec) => {

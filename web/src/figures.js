@@ -20,7 +20,7 @@ const CONDITIONS = [
 
 const SUPPORT_NOTE = 'The yellow areas show when balancing runs.';
 
-/** Of all three axes, or sideways only. */
+/** The motion along all three axes, or where `lateral` sideways only. */
 function comMotion(run, figure, lateral, note = '') {
   // Whoever came late, or has a part of the run, knows no earlier place.
   const origin = run.meta.live ? ' Motion from where it was in the first tick that the viewer heard.'

@@ -6,7 +6,7 @@ const UNITS = ['m/s^2', 'rad/s', 'm/s', 'N·m', 'rad', 'us', 'm', 'N', 'A', 's',
 const SCALARS = new Set(['int8_t', 'byte', 'boolean', 'int16_t', 'int32_t', 'int64_t', 'float', 'double', 'string']);
 
 /** The unit that a field's comment begins with; '' when it begins with none. */
-export function unitOf(comment) {
+function unitOf(comment) {
   const unit = UNITS.find((u) => comment === u || /^[,;:( ]/.test(comment.slice(u.length)) && comment.startsWith(u));
   return unit === 'm/s^2' ? 'm/s²' : unit === 'us' ? 'µs' : unit ?? '';
 }

@@ -10,7 +10,7 @@ export const COLORS = {
   'hue-0': ['#1f5fd0', '#6ea8ff'], 'hue-1': ['#c2410c', '#ff9a4d'], 'hue-2': ['#0f8a4b', '#3ecf8e'],
   'hue-3': ['#a11fb0', '#e58cff'], 'hue-4': ['#8a6d00', '#e6c84d'], 'hue-5': ['#0e7490', '#5fd3ea'],
   'hue-6': ['#7c2d12', '#d9a083'], 'hue-7': ['#4b5563', '#b3bdcc'],
-  // Of the picture alone.
+  // The picture alone has these.
   'measured-mark': ['#1d1d1f', '#f2f2f2'], com: ['#0f8a4b', '#3ecf8e'], capture: ['#8a6d00', '#e6c84d'],
   reach: ['#0e7490', '#5fd3ea'], push: ['#c2410c', '#ff9a4d'], support: ['#5b6675', '#9fb0c5'],
 };

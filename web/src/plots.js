@@ -113,7 +113,7 @@ class Panel {
     return this.building ??= this.#build();
   }
 
-  /** The same, and what is done `then`; where it fails, the plot's place says why. */
+  /** Shows the plot and then calls `then`; where that fails, the plot's place says why. */
   draw(then) {
     return this.show().then(then).catch((error) => {
       console.error(error);

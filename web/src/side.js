@@ -99,7 +99,8 @@ export class EventList {
     const now = this.player.time + this.player.run.period / 2;
     const last = this.#buttons.findLast(([time]) => time <= now)?.[0];
     for (const [time, button] of this.#buttons) {
-      button.ariaCurrent = time === last ? 'time' : null;
+      if (time === last) button.setAttribute('aria-current', 'time');
+      else button.removeAttribute('aria-current');
     }
   }
 }

@@ -71,7 +71,7 @@ const drawRing = (ctx, x, y, k) =>
 const drawPaperLine = (ctx, from, to, y, k) =>
   stroke(ctx, cssColor('--event'), 1.5 * k, [6 * k, 4 * k], () => segment(ctx, [from, y], [to, y]));
 
-/** What says that a mark has no value of the scale, or of a cell that a part of its runs has none. */
+/** Draws what says that a mark has no value of the scale, or that some of a cell's runs did not stand. */
 function drawState(ctx, mark, x, y, k) {
   if (mark.state === 'untold') drawRing(ctx, x, y, k);
   else if (mark.state === 'fell') drawCross(ctx, x, y, k);
