@@ -41,8 +41,9 @@ constexpr double kSpeedError = 0.11;
 // s of the ramp (61) before a foot leaves the ground, and s in the air at least. On a point mass
 // shorter ones catch no more (docs/lab/steps/2026-11-28-level-feet.md).
 constexpr double kPushUnload = 0.02, kLeastSwing = 0.12;
-constexpr double kGap = 0.02;               // m between the soles, sideways
-constexpr double kLongStepLowering = 0.06;  // m by which longer steps lower the COM at most
+constexpr double kGap = 0.02;  // m between the soles, sideways
+// Share of the standing height by which steps lower the COM.
+constexpr double kStepLowering = 0.08;
 // Share of the weight that an observed load must be above to be a landing: a leg that brakes its
 // swing was seen to be misjudged by 0.05, by more than three standard deviations.
 constexpr double kObservedLoad = 0.15;
@@ -121,14 +122,14 @@ stepping::StepChoice MakeStepChoice(const robot::RobotModel& model) {
                                   kSoleMargin, foot.name, foot.length, foot.width));
   }
   const double height = robot::StandingHeight(model);
-  const stepping::Reach reach(model, height, kLongStepLowering, kGap);
+  const double lowering = kStepLowering * height;
+  const stepping::Reach reach(model, height, lowering, kGap);
   if (reach.empty()) {
-    throw ConfigError(
-        "recovery",
-        fmt::format("lowers the COM by {} m; robot '{}' cannot stand so much lower "
-                    "than {} m with its joints {} rad off their limits: its file's "
-                    "stance or limits leave no room to step",
-                    kLongStepLowering, model.name(), height, stepping::Reach::kJointReserve));
+    throw ConfigError("recovery",
+                      fmt::format("lowers the COM by {} m; robot '{}' cannot stand so much lower "
+                                  "than {} m with its joints {} rad off their limits: its file's "
+                                  "stance or limits leave no room to step",
+                                  lowering, model.name(), height, stepping::Reach::kJointReserve));
   }
   stepping::StepLimits limits;
   limits.sole_margin = kSoleMargin;
@@ -164,7 +165,7 @@ stepping::RecoverySpec MakeRecoverySpec(const RecoveryConfig& config,
   spec.turn_share = TurningInertia(model) / (model.total_mass() * robot::kGravity);
   spec.watched_margin = watched_margin;
   spec.walk_lowering = MostLowering(model, kWalkLowering * robot::StandingHeight(model));
-  spec.holding_lowering = MostLowering(model, kLongStepLowering);
+  spec.holding_lowering = MostLowering(model, kStepLowering * robot::StandingHeight(model));
   return spec;
 }
 

@@ -229,17 +229,18 @@ double Reach::BesideCom(Foot stance) const {
   return std::max(0.0, -inside);
 }
 
-Vector2d Reach::ComAbove(Foot stance, const Vector2d& com) const {
-  const balance::ConvexPolygon& leg = leg_[stance][1];
+Vector2d Reach::ComAbove(Foot stance, const Vector2d& com, double share) const {
+  const balance::ConvexPolygon leg = Leg(stance, share);
   if (leg.num_corners == 0) return com;
   const Vector2d nearest = -balance::NearestPoint(leg, -com);
   const double excess = (com - nearest).norm();
   return excess > roll_ ? Vector2d(nearest + roll_ / excess * (com - nearest)) : com;
 }
 
-balance::ConvexPolygon Reach::Footholds(Foot foot, const Vector2d& com, Crossing crossing) const {
-  const Vector2d above = ComAbove(Other(foot), com);
-  balance::ConvexPolygon reached = leg_[foot][1];
+balance::ConvexPolygon Reach::Footholds(Foot foot, const Vector2d& com, Crossing crossing,
+                                        double share) const {
+  const Vector2d above = ComAbove(Other(foot), com, share);
+  balance::ConvexPolygon reached = Leg(foot, share);
   for (Vector2d& corner : reached.mutable_corners()) corner += above;
   if (crossing == Crossing::kInFront) return balance::Clip(reached, {{-1, 0}, -least_ahead_});
   if (crossing == Crossing::kBehind) return balance::Clip(reached, {{1, 0}, -least_ahead_});

@@ -47,14 +47,14 @@ class Reach {
   /// height: 0 where the leg stands right below it.
   double BesideCom(Foot stance) const;
   /// `com`, or the nearest place where it can be with the sole of `stance` at the origin: lowered
-  /// all the way, in that leg's reach or `roll` beyond it.
-  Eigen::Vector2d ComAbove(Foot stance, const Eigen::Vector2d& com) const;
+  /// by `share` of `lowering`, in that leg's reach or `roll` beyond it.
+  Eigen::Vector2d ComAbove(Foot stance, const Eigen::Vector2d& com, double share = 1) const;
   /// Sole centre of `foot`, the other's at the origin and the COM above `ComAbove` of `com`,
-  /// lowered all the way: the leg's reach, and beside the other sole, ahead of it or behind it,
+  /// lowered by `share`: the leg's reach, and beside the other sole, ahead of it or behind it,
   /// `gap` between them. So the legs span what is between the soles, wherever `com` is. Beside, the
   /// legs do not cross; of the other two that is not said.
   balance::ConvexPolygon Footholds(Foot foot, const Eigen::Vector2d& com,
-                                   Crossing crossing = Crossing::kNone) const;
+                                   Crossing crossing = Crossing::kNone, double share = 1) const;
   double least_spacing() const { return least_spacing_; }  ///< m between the soles' centres
   double least_ahead() const { return least_ahead_; }      ///< the same, one ahead of the other
   double lowering() const { return lowering_; }            ///< m

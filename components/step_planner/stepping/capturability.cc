@@ -38,7 +38,8 @@ RegionFinder::RegionFinder(const StepChoice& choice) {
   FootArray<balance::ConvexPolygon> sole;
   for (const Foot foot : kFeet) {
     sole[foot] = balance::SolePolygon(choice.foot(foot), limits.sole_margin);
-    footholds_[foot] = choice.reach().Footholds(foot, Vector2d::Zero());
+    footholds_[foot] = choice.reach().Footholds(foot, Vector2d::Zero(), Crossing::kNone,
+                                                StepChoice::CountedLowering(Crossing::kNone));
   }
   stands_ = sole[0].num_corners > 0 && sole[1].num_corners > 0;
   reaches_ = footholds_[0].num_corners > 0 && footholds_[1].num_corners > 0;

@@ -97,6 +97,7 @@ class DampedLead {
   /// `rate`, 1/s: critically damped, two such poles.
   explicit DampedLead(double rate = 1) : rate_(rate) {}
   void Begin(double height) { point_ = {height, 0, 0}; }
+  void set_rate(double rate) { rate_ = rate; }  ///< 1/s, from now on
   void Follow(double wanted, double period);
   const Quintic::Point& point() const { return point_; }
   void Archive(StateArchive* archive) { archive->Show(point_); }

@@ -422,24 +422,25 @@ bool Recovery::AtRest(const StepInput& input, const StepState& state) {
 
 double Recovery::LoweringShare(const StepState& state) const {
   const double lowering = choice_.reach().lowering();
-  double share = 0, most = 1;
-  if (command_.stepping) share = spec_.walk_lowering / lowering;
-  // Nothing is to be caught, and knees that are bent for seconds get hot.
-  if (reason_ == StepReason::kTogether) most = std::min(most, spec_.holding_lowering / lowering);
+  const double walking = command_.stepping ? spec_.walk_lowering / lowering : 0;
   // A walk keeps its height: a COM that comes down with each step brings its foot down too soon.
-  if (!command_.stepping || reason_ != StepReason::kWalk) {
-    const Eigen::Matrix2d turn = Eigen::Rotation2Dd(-state.yaw).toRotationMatrix();
-    FootArray<Vector2d> offset;
-    const bool steps = stage_ == Stage::kUnloading || stage_ == Stage::kSwinging;
-    // Where both soles and the COM will be.
-    const Vector2d com = steps ? plan_.com : state.pendulum.com;
-    for (const Foot foot : kFeet) {
-      const bool swings = steps && foot == plan_.foot;
-      offset[foot] = turn * ((swings ? plan_.foothold : state.sole[foot]) - com);
-    }
-    share = std::max(share, choice_.reach().LoweringShare(offset));
+  if (command_.stepping && reason_ == StepReason::kWalk) return std::min(walking, 1.0);
+  const bool together = reason_ == StepReason::kTogether;
+  const bool steps = stage_ == Stage::kUnloading || stage_ == Stage::kSwinging;
+  // Bent knees: one that gets straight is stopped short of its foothold.
+  if (!together && (steps || stage_ == Stage::kLoading)) return 1;
+  const Eigen::Matrix2d turn = Eigen::Rotation2Dd(-state.yaw).toRotationMatrix();
+  FootArray<Vector2d> offset;
+  // Where both soles and the COM will be.
+  const Vector2d com = steps ? plan_.com : state.pendulum.com;
+  for (const Foot foot : kFeet) {
+    const bool swings = steps && foot == plan_.foot;
+    offset[foot] = turn * ((swings ? plan_.foothold : state.sole[foot]) - com);
   }
-  return std::min(share, most);
+  const double needed = std::max(walking, choice_.reach().LoweringShare(offset));
+  // With the feet put together nothing is to be caught, and knees that are bent for seconds get
+  // hot.
+  return std::min(needed, together ? std::min(spec_.holding_lowering / lowering, 1.0) : 1.0);
 }
 
 void Recovery::LeadCom(const StepInput& input, const StepState& state) {
@@ -452,6 +453,8 @@ void Recovery::LeadCom(const StepInput& input, const StepState& state) {
   const double ground = input.sole[stance].translation().z();
   const double wanted =
       ground + standing_height_ - LoweringShare(state) * choice_.reach().lowering();
+  const bool catches = reason_ != StepReason::kWalk && reason_ != StepReason::kTogether;
+  height_.set_rate(catches ? kCatchingHeightRate : kHeightRate);
   height_.Follow(wanted, period);
   TurnBody(state, period);
 

@@ -141,9 +141,9 @@ class Recovery {
   // Ratio: by this share of the capture point's error the centre of pressure goes beyond it, so
   // that the error decays at this times ω.
   static constexpr double kGain = 0.4;
-  // 1/s with which the COM's height goes where the legs ask for it, and the body's heading where
-  // the feet's is.
-  static constexpr double kHeightRate = 8, kYawRate = 6;
+  // 1/s with which the COM's height goes where the legs ask for it, in a step that catches a push
+  // and else, and the body's heading where the feet's is.
+  static constexpr double kCatchingHeightRate = 20, kHeightRate = 8, kYawRate = 6;
   // m/s², a share of g, with which a commanded velocity is approached, and rad/s², a turn rate:
   // some steps to full speed, each within reach.
   static constexpr double kAcceleration = 0.05 * robot::kGravity, kTurnAcceleration = 1;

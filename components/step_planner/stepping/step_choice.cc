@@ -157,11 +157,12 @@ StepPlan StepChoice::At(const StepState& state, Foot foot, double time, Crossing
         std::max(0.0, 0.5 * feet_[foot].width - limits_.sole_margin - limits_.ample_margin);
     wanted.y() = std::clamp(side * limits_.spacing, wanted.y() - room, wanted.y() + room);
   }
-  PutDown(state, wanted, &plan);
+  PutDown(state, wanted, CountedLowering(crossing), &plan);
   return plan;
 }
 
-void StepChoice::PutDown(const StepState& state, const Vector2d& wanted, StepPlan* plan) const {
+void StepChoice::PutDown(const StepState& state, const Vector2d& wanted, double share,
+                         StepPlan* plan) const {
   const Foot foot = plan->foot, stance = Other(foot);
   const Foot s = stance;
   const Crossing crossing = plan->crossing;
@@ -170,13 +171,13 @@ void StepChoice::PutDown(const StepState& state, const Vector2d& wanted, StepPla
     return turn.transpose() * (point - state.sole[s]);
   };
   const Vector2d com = local(plan->com);
-  plan->leg_margin = balance::SignedDistance(reach_.Leg(stance, 1), Vector2d(-com));
-  const balance::ConvexPolygon footholds = reach_.Footholds(foot, com, crossing);
+  plan->leg_margin = balance::SignedDistance(reach_.Leg(stance, share), Vector2d(-com));
+  const balance::ConvexPolygon footholds = reach_.Footholds(foot, com, crossing, share);
   Vector2d foothold(0, Side(foot) * limits_.spacing);
   bool reached = footholds.num_corners > 0;
   if (reached) foothold = balance::NearestPoint(footholds, wanted);
   if (crossing != Crossing::kNone && reached) {
-    reached = ClearOfLeg(foot, reach_.ComAbove(stance, com), &foothold) &&
+    reached = ClearOfLeg(foot, reach_.ComAbove(stance, com, share), &foothold) &&
               balance::SignedDistance(footholds, foothold) >= -kOffReach;
   }
   if (limits_.leg_distance > 0) {
@@ -230,7 +231,7 @@ StepPlan StepChoice::StrideAt(const StepState& state, Foot foot, const Gait& gai
   plan.time = time;
   plan.yaw = stride.next.yaw;
   const Vector2d wanted = plan.capture_point - stride.end - state.sole[s];
-  PutDown(state, Eigen::Rotation2Dd(-state.yaw) * wanted, &plan);
+  PutDown(state, Eigen::Rotation2Dd(-state.yaw) * wanted, 1, &plan);
   plan.moved = (plan.foothold - stride.next.position).norm();
   return plan;
 }

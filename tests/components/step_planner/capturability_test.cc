@@ -41,6 +41,11 @@ double Farthest(const ConvexPolygon& polygon, const Vector2d& direction) {
   return most;
 }
 
+ConvexPolygon Footholds(const StepChoice& choice, Foot foot) {
+  return choice.reach().Footholds(foot, {0, 0}, Crossing::kNone,
+                                  StepChoice::CountedLowering(Crossing::kNone));
+}
+
 // Ahead and back both feet reach equally far: r is the sole's half length less the edge, l the
 // farthest foothold, and the region is d_N of Koolen et al. 2012, eq. 31.
 TEST(CaptureRegions, AreTheClosedFormAheadAndBack) {
@@ -54,8 +59,8 @@ TEST(CaptureRegions, AreTheClosedFormAheadAndBack) {
     for (const double sign : {1.0, -1.0}) {
       const Vector2d along(sign, 0), direction = Eigen::Rotation2Dd(yaw) * along;
       const double rest = 0.5 * choice.foot(stance).length - kEdge;
-      const double reach = Farthest(choice.reach().Footholds(Other(stance), {0, 0}), along);
-      ASSERT_NEAR(reach, Farthest(choice.reach().Footholds(stance, {0, 0}), along), 5e-3);
+      const double reach = Farthest(Footholds(choice, Other(stance)), along);
+      ASSERT_NEAR(reach, Farthest(Footholds(choice, stance), along), 5e-3);
       for (int steps = 0; steps <= kMostRegionSteps; ++steps) {
         const double region =
             Farthest(regions.region[static_cast<size_t>(steps)], direction) - sole.dot(direction);
@@ -79,7 +84,7 @@ TEST(CaptureRegions, TheirCornersAreJustCaught) {
     const CaptureRegions about = RegionFinder(choice).About({stance, {0, 0}, 0, frequency, time});
     const CaptureRegions next = RegionFinder(choice).About({other, {0, 0}, 0, frequency, time});
     const ConvexPolygon sole = about.region[0];
-    const ConvexPolygon footholds = choice.reach().Footholds(other, {0, 0});
+    const ConvexPolygon footholds = Footholds(choice, other);
     for (size_t steps = 1; steps < about.region.size(); ++steps) {
       for (int k = 0; k < kRegionDirections; ++k) {
         const double angle = 2 * std::numbers::pi * k / kRegionDirections;

@@ -252,7 +252,7 @@ TEST_P(ReachCase, NoFootholdIsMuchBetterThanTheChosen) {
   std::mt19937 random{TestSeed(164)};
   std::uniform_real_distribution<double> any(-1, 1);
   int possible = 0;
-  for (int trial = 0; trial < 60; ++trial) {
+  for (int trial = 0; trial < 120; ++trial) {
     StepState state;
     state.pendulum.frequency = std::sqrt(kGravity / height_);
     const double angle = M_PI * any(random), speed = 0.75 + 0.5 * any(random);
@@ -263,7 +263,9 @@ TEST_P(ReachCase, NoFootholdIsMuchBetterThanTheChosen) {
       ASSERT_EQ(plan.foot, foot);
       EXPECT_GE(plan.time, limits.unload + limits.least_swing - 1e-12);
       const auto stance = robot::Index(Other(foot));
-      const balance::ConvexPolygon footholds = reach.Footholds(foot, plan.com - state.sole[stance]);
+      constexpr double kLowered = StepChoice::CountedLowering(Crossing::kNone);
+      const balance::ConvexPolygon footholds =
+          reach.Footholds(foot, plan.com - state.sole[stance], Crossing::kNone, kLowered);
       if (footholds.num_corners < 3) continue;
       double best = -1;
       for (double x = -1; x < 1; x += 0.02) {
@@ -278,7 +280,8 @@ TEST_P(ReachCase, NoFootholdIsMuchBetterThanTheChosen) {
       }
       // A step that the stance leg cannot follow counts as worse, wherever the foot goes.
       const Vector2d behind = state.sole[stance] - plan.com;
-      if (best < limits.ample_margin || !balance::Contains(reach.Leg(Other(foot), 1), behind))
+      if (best < limits.ample_margin ||
+          !balance::Contains(reach.Leg(Other(foot), kLowered), behind))
         continue;
       ++possible;
       EXPECT_GE(plan.margin, -0.02) << "foot " << robot::Index(foot) << ", velocity "
