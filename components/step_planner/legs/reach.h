@@ -39,6 +39,7 @@ class Reach {
     return false;
   }
   /// Sole centre of `foot` from the COM, with the COM lowered by `share` of `lowering`, 0 to 1.
+  /// Where the polygons of both heights have unlike numbers of corners, that of standing below 1.
   balance::ConvexPolygon Leg(Foot foot, double share) const;
   /// Least share of `lowering` with which the soles stand at `offset` from the COM by foot; above
   /// 1, and by how many m, when even the lowest does not do.
