@@ -146,7 +146,7 @@ stepping::StepChoice MakeStepChoice(const robot::RobotModel& model) {
   limits.longest = LongestStride(reach, limits.spacing);
   limits.widest = std::max(0.0, WidestStance(reach) - limits.spacing);
   limits.most_turn = kMostStepTurn;
-  limits.walk_lowering = kWalkLowering / kStepLowering;
+  limits.stride_lowering = kWalkLowering / kStepLowering;
   limits.leg_distance = std::max(std::max(model.feet()[0].width, model.feet()[1].width),
                                  kLegShare * stepping::Legs(model).hip_spacing());
   return {model, reach, limits};

@@ -427,7 +427,7 @@ double Recovery::LoweringShare(const StepState& state) const {
   if (command_.stepping && reason_ == StepReason::kWalk) return std::min(walking, 1.0);
   const bool together = reason_ == StepReason::kTogether;
   const bool steps = stage_ == Stage::kUnloading || stage_ == Stage::kSwinging;
-  // Bent knees: one that gets straight is stopped short of its foothold.
+  // A knee that gets straight is stopped, and its foot hangs short of the foothold.
   if (!together && (steps || stage_ == Stage::kLoading)) return 1;
   const Eigen::Matrix2d turn = Eigen::Rotation2Dd(-state.yaw).toRotationMatrix();
   FootArray<Vector2d> offset;

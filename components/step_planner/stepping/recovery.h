@@ -142,7 +142,8 @@ class Recovery {
   // that the error decays at this times ω.
   static constexpr double kGain = 0.4;
   // 1/s with which the COM's height goes where the legs ask for it, in a step that catches a push
-  // and else, and the body's heading where the feet's is.
+  // (fitted: docs/lab/steps/2026-11-29-knees-that-stay-bent.md) and else, and the body's heading
+  // where the feet's is.
   static constexpr double kCatchingHeightRate = 20, kHeightRate = 8, kYawRate = 6;
   // m/s², a share of g, with which a commanded velocity is approached, and rad/s², a turn rate:
   // some steps to full speed, each within reach.
