@@ -7,8 +7,6 @@
 #include <cmath>
 #include <limits>
 
-#include "components/robot/dynamics.h"
-
 namespace poise::robot {
 namespace {
 
@@ -234,6 +232,22 @@ double StandingHeight(const RobotModel& model) {
   if (model.stance().com_height) return *model.stance().com_height;
   const RobotData data = Evaluate(model, model.stance().joint_position);
   return data.com.z() - data.foot_pose[Foot::kRight].translation().z();
+}
+
+int Knee(const RobotModel& model, const RobotData& data, Foot foot) {
+  const auto joints = model.supporting_joints(model.feet()[foot].body);
+  // A joint's frame is that of the body that it carries.
+  const auto at = [&](int joint) { return data.body_position[static_cast<size_t>(joint) + 1]; };
+  int knee = -1;
+  double most = -1;
+  for (const int joint : joints) {
+    const double least =
+        std::min((at(joint) - at(joints.front())).norm(), (at(joint) - at(joints.back())).norm());
+    if (least <= most) continue;
+    most = least;
+    knee = joint;
+  }
+  return knee;
 }
 
 double StandingSpacing(const RobotModel& model) {

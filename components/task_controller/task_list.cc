@@ -8,6 +8,8 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "components/messages/motion.h"
+#include "components/robot/dynamics.h"
+#include "components/robot/posture.h"
 
 namespace poise {
 namespace {
@@ -78,6 +80,12 @@ void CheckReference(const balance::TargetParts& needed, const TaskConfig& task,
                                 TaskConfig::Reference_Name(reference), missing, task.type()));
 }
 
+/// Row of the height in a task of a position; −1: it has none.
+int HeightRow(const balance::AxisSelection& axes) {
+  if (std::ranges::none_of(axes, [](bool selected) { return selected; })) return balance::kZ;
+  return axes[balance::kZ] ? axes[balance::kX] + axes[balance::kY] : -1;
+}
+
 void SetPoint(const PointMotion& motion, balance::TaskTarget* target) {
   target->position = motion.position;
   target->velocity = motion.velocity;
@@ -137,8 +145,12 @@ TaskList::TaskList(const TaskControllerConfig& config,
   std::ranges::stable_sort(entries_, {}, &Entry::level);
   int rows = kMostForced;
   for (const Entry& entry : entries_) rows += entry.task->num_rows();
-  hierarchy_.emplace(model_->num_joints(), rows, static_cast<int>(entries_.size()) + 1);
-  level_rows_.reserve(entries_.size() + 1);
+  // Forced joints come before the entries' levels, and a COM's height after them.
+  const size_t levels = entries_.size() + 2;
+  hierarchy_.emplace(model_->num_joints(), rows, static_cast<int>(levels));
+  level_rows_.reserve(levels);
+  const robot::RobotData stance = robot::Evaluate(*model_, model_->stance().joint_position);
+  for (const Foot foot : robot::kFeet) knee_[foot] = robot::Knee(*model_, stance, foot);
   jacobian_.setZero(rows, model_->num_velocities());
   bias_acceleration_.setZero(rows);
   acceleration_.setZero(rows);
@@ -172,6 +184,8 @@ void TaskList::Add(const TaskConfig& task, const std::string& field,
                                          : GainsOf(needed, entry.reference, task.type(), gains));
   entry.type = task.type();
   entry.own_gains = task.has_gains();
+  entry.foot = spec.foot;
+  entry.height_row = needed.position ? HeightRow(spec.axes) : -1;
   for (const Foot foot : robot::kFeet) {
     entry.rests[foot] = spec.foot == foot || entry.reference == FootReference(foot);
   }
@@ -247,6 +261,9 @@ bool TaskList::Compute(const balance::TaskState& state, const balance::ContactDy
     ++row;
   }
   if (row > 0) level_rows_.push_back(static_cast<int>(row));
+  const bool leg_stops = std::ranges::any_of(
+      robot::kFeet, [&](Foot f) { return in_contact[f] && KneeStops(f, forced); });
+  Eigen::Index com_height = -1;
   const Entry* last = nullptr;
   for (const Entry& entry : entries_) {
     if (!IsActive(entry, in_contact)) continue;
@@ -263,9 +280,34 @@ bool TaskList::Compute(const balance::TaskState& state, const balance::ContactDy
     level_rows_.back() += static_cast<int>(t);
     last = &entry;
     row += t;
+    if (entry.height_row < 0) continue;
+    const Eigen::Index height = row - t + entry.height_row;
+    if (entry.type == "com" && leg_stops) {
+      com_height = height;
+      --level_rows_.back();
+    } else if (entry.foot && KneeStops(*entry.foot, forced)) {
+      MoveRow(height, level_rows_.front());
+      if (com_height >= 0) ++com_height;
+      ++level_rows_.front();
+      --level_rows_.back();
+    }
   }
+  if (com_height >= 0) {
+    MoveRow(com_height, row - 1);
+    level_rows_.push_back(1);
+  }
+  std::erase(level_rows_, 0);
   return hierarchy_->Compute(contact, jacobian_.topRows(row), bias_acceleration_.head(row),
                              acceleration_.head(row), level_rows_, others);
+}
+
+void TaskList::MoveRow(Eigen::Index from, Eigen::Index to) {
+  const Eigen::Index step = from < to ? 1 : -1;
+  for (Eigen::Index i = from; i != to; i += step) {
+    jacobian_.row(i).swap(jacobian_.row(i + step));
+    std::swap(bias_acceleration_[i], bias_acceleration_[i + step]);
+    std::swap(acceleration_[i], acceleration_[i + step]);
+  }
 }
 
 void TaskList::Archive(StateArchive* archive) {

@@ -55,7 +55,10 @@ class TaskList {
   void set_base_velocity_lag(const balance::Vector6d& lag) { base_lag_ = lag; }
   /// The hierarchy's torque at `state`, for which `contact` was computed. False when no task is
   /// active, or as TaskHierarchy::Compute says, which gets `others`. `forced` come before all
-  /// levels: joints that must accelerate so (rad/s²), at most kMostForced. Never allocates.
+  /// levels: joints that must accelerate so (rad/s²), at most kMostForced. The knee of a free foot
+  /// among them takes nothing of that foot's height, which then comes before all levels, too: a
+  /// foot that lands late lands too late. That of a foot in contact takes the COM's height, which
+  /// then comes after all levels: a leg that gets no longer cannot hold it up. Never allocates.
   struct ForcedJoint {
     int joint = -1;
     double acceleration = 0;
@@ -78,17 +81,26 @@ class TaskList {
     balance::TaskTarget held;
     std::string type;
     bool own_gains = false;
+    std::optional<robot::Foot> foot;  // whose frame it is
+    int height_row = -1;              // of its rows; −1: it has none
   };
 
   void Add(const TaskConfig& task, const std::string& field, const balance::StandingGains& gains);
   const balance::TaskTarget& Target(const Entry& entry) const;
+  /// Moves a row to another place; those in between close up.
+  void MoveRow(Eigen::Index from, Eigen::Index to);
+  /// The knee of `foot` is one of `forced`.
+  bool KneeStops(robot::Foot foot, std::span<const ForcedJoint> forced) const {
+    return std::ranges::any_of(forced, [&](const auto& j) { return j.joint == knee_[foot]; });
+  }
   static bool IsActive(const Entry& entry, const FeetInContact& in_contact) {
     return std::ranges::none_of(robot::kFeet,
                                 [&](robot::Foot f) { return entry.rests[f] && in_contact[f]; });
   }
 
   std::shared_ptr<const robot::RobotModel> model_;
-  std::vector<Entry> entries_;  // by level
+  std::vector<Entry> entries_;          // by level
+  robot::FootArray<int> knee_{-1, -1};  // joints
   balance::TaskTarget com_, body_;
   robot::FootArray<balance::TaskTarget> foot_;
   std::optional<balance::TaskHierarchy> hierarchy_;

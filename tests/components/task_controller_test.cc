@@ -358,6 +358,65 @@ TEST(TaskController, ASoleThatTurnsIsNotStoppedByTheBody) {
   EXPECT_GT((torque(state, "") - torque(state, "joint_limits: false")).norm(), 1);
 }
 
+/// How the tasks accelerate on the left foot with one knee at 8 rad/s, less how they would with
+/// joints that have no limits. That is more than can be stopped before the knee is straight.
+struct StoppedKnee {
+  explicit StoppedKnee(const char* knee) {
+    const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+    const int joint = model.FindJoint(knee);
+    robot::RobotState state = StandingState(model);
+    const robot::RobotData data = robot::Evaluate(model, state);
+    Eigen::VectorXd motion = Eigen::VectorXd::Unit(model.num_velocities(), 6 + joint) * -8;
+    // The sole that stands does so while the body moves.
+    motion.head<6>() = -data.foot_jacobian[1].leftCols<6>().fullPivLu().solve(
+        data.foot_jacobian[1].col(6 + joint) * -8);
+    robot::SetVelocity(motion, &state);
+    const Contacts left{false, true};
+    const support_plan_t plan = HoldAt(model, data, left);
+    const Dynamics dynamics(model, state, left);
+    const auto acceleration = [&](const char* limits) {
+      ControlContext context(TestRobot::kDyros);
+      Harness<TaskController> harness(&context, TaskControllerText() + limits);
+      harness.Bind("support_plan", &plan);
+      const robot_state_t message = StateMessage(model, state);
+      harness.Bind("robot_state", &message);
+      harness.Run(TickAt(0));
+      EXPECT_EQ(harness.output<task_torque_t>().status, task_torque_t::STATUS_OK);
+      Eigen::VectorXd q, wrench;
+      dynamics.Forward(ToEigen(harness.output<task_torque_t>().torque), &q, &wrench);
+      return q;
+    };
+    const Eigen::VectorXd change = acceleration("") - acceleration("joint_limits: false");
+    of_knee = change[6 + joint];
+    com = dynamics.data.com_jacobian * change;
+    foot = dynamics.data.foot_jacobian[0] * change;
+    Eigen::MatrixXd body = Eigen::MatrixXd::Zero(6, model.num_velocities());
+    robot::ComputePointJacobian(model, dynamics.data, model.body_task_body(),
+                                Eigen::Vector3d::Zero(), body);
+    turn = body.bottomRows<3>() * change;
+  }
+
+  double of_knee = 0;  // rad/s²
+  Eigen::Vector3d com, turn;
+  robot::Vector6d foot;  // the free one
+};
+
+TEST(TaskController, ALegThatGetsNoLongerLetsTheComDown) {
+  const StoppedKnee stopped("left_knee_pitch");
+  EXPECT_GT(stopped.of_knee, 1);
+  EXPECT_LT(stopped.com.z(), -1);
+  EXPECT_LT(stopped.com.head<2>().norm(), 1e-8);
+  EXPECT_LT(stopped.turn.norm(), 1e-8);
+  EXPECT_LT(stopped.foot.norm(), 1e-7);
+}
+
+TEST(TaskController, AKneeThatIsStoppedLeavesItsFootTheHeight) {
+  const StoppedKnee stopped("right_knee_pitch");
+  EXPECT_GT(stopped.of_knee, 1);
+  EXPECT_LT(std::abs(stopped.foot[2]), 1e-8);
+  EXPECT_GT(stopped.foot.norm(), 1);
+}
+
 // A quaternion off by less than the message's tolerance gives the torque of its direction; one
 // beyond is refused.
 TEST(TaskController, NormalisesTheOrientationItAccepts) {

@@ -29,15 +29,7 @@ Legs::Legs(const robot::RobotModel& model) : height_(robot::StandingHeight(model
       return data.body_position[static_cast<size_t>(joint) + 1];
     };
     const Vector3d ankle = at(joints.front()), hip = at(joints.back());
-    Vector3d knee = ankle;
-    double most = -1;
-    for (const int joint : joints) {
-      const double least = std::min((at(joint) - ankle).norm(), (at(joint) - hip).norm());
-      if (least > most) {
-        most = least;
-        knee = at(joint);
-      }
-    }
+    const Vector3d knee = at(robot::Knee(model, data, f));
     const Vector3d sole = goal.foot[f].translation() - data.base_position;
     const Vector3d line = (ankle - hip).normalized();
     const Vector3d out = (knee - hip) - line.dot(knee - hip) * line;
