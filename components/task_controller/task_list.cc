@@ -282,7 +282,7 @@ bool TaskList::Compute(const balance::TaskState& state, const balance::ContactDy
     row += t;
     if (entry.height_row < 0) continue;
     const Eigen::Index height = row - t + entry.height_row;
-    if (entry.type == "com" && leg_stops) {
+    if (entry.type == "com" && leg_stops && com_height < 0) {
       com_height = height;
       --level_rows_.back();
     } else if (entry.foot && KneeStops(*entry.foot, forced)) {
