@@ -173,7 +173,8 @@ TEST(Step, TheFeetComeSideBySideWhenAskedTo) {
     const RunFolder folder;
     const ProgramResult result =
         RunPoise({"run", "push_double_support", "--variant", "step", "--world", world, "--inline",
-                  "--no-reference", "--duration", "12", "--out", folder / "run"});
+                  "--no-reference", "--duration", "12", "--set", "sim.push[0].peak=380", "--out",
+                  folder / "run"});
     EXPECT_EQ(result.exit_code, 0) << world << result.output;
     const logging::LogMessages log(folder / "run/run.lcm");
     const RunSpec& spec = log.spec();

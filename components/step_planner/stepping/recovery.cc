@@ -310,7 +310,7 @@ bool Recovery::StepAtLanding(const StepInput& input, const StepState& state) {
     const double margin =
         balance::SignedDistance(choice_.Soles(state), state.pendulum.capture_point());
     if (margin > kStepOnShare * choice_.limits().ample_margin) return false;
-    next = choice_.Next(state, other);
+    next = choice_.Next(state, other, 0);
   }
   if (!BeginStep(input, next, reason)) return false;
   LiftOff(input);
@@ -319,24 +319,32 @@ bool Recovery::StepAtLanding(const StepInput& input, const StepState& state) {
 
 void Recovery::Replan(const StepInput& input, const StepState& state) {
   if (stage_ != Stage::kUnloading && stage_ != Stage::kSwinging) return;
-  const bool swings = stage_ == Stage::kSwinging;
+  const bool swings = stage_ == Stage::kSwinging, walks = reason_ == StepReason::kWalk;
   // A push takes over a foot that is under way to the other's side.
   if (reason_ == StepReason::kTogether) {
     if (!(Excess(state) > kLeastExcess)) return;
-    Hurry(state, input.time);
+    Hurry(input.time);
   }
-  const double left = steps_.first().touch_down - input.time;
+  Footstep& step = steps_.first();
+  if (!swings && !walks) {
+    const StepPlan next = choice_.Next(state, plan_.foot, step.lift_off - input.time);
+    if (!next.possible) return;
+    step.touch_down = input.time + next.time;
+    step.load = step.touch_down + LoadTime();
+    SetPlan(next);
+    return;
+  }
+  const double left = step.touch_down - input.time;
   if (!(left > kSwing.freeze)) return;
-  const bool walks = reason_ == StepReason::kWalk;
   const StepPlan next = walks ? choice_.StrideAt(state, plan_.foot, gait(state), left)
                               : choice_.At(state, plan_.foot, left, plan_.crossing);
   // A foothold that the way under way does not lead to is none.
-  const bool leads = walks || !swings || foot_.swing().around() || !next.around;
+  const bool leads = walks || foot_.swing().around() || !next.around;
   if (std::isfinite(next.margin) && leads) SetPlan(next);
-  if (swings) foot_.Move(steps_.first(), input.time);
+  if (swings) foot_.Move(step, input.time);
 }
 
-void Recovery::Hurry(const StepState& state, double time) {
+void Recovery::Hurry(double time) {
   reason_ = StepReason::kAgain;
   if (stage_ != Stage::kUnloading) return;
   const double share = std::clamp(Ramp(time), 0.0, 1.0);
@@ -345,8 +353,6 @@ void Recovery::Hurry(const StepState& state, double time) {
   step.lift_off = step.unload + UnloadTime();
   ramp_from_ = share;
   cop_from_ = output_.cop;
-  const StepPlan next = choice_.Plan(state, plan_.foot, plan_.crossing);
-  step.touch_down = std::min(step.touch_down, time + next.time - share * UnloadTime());
 }
 
 double Recovery::Ramp(double time) const {

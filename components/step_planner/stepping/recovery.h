@@ -86,7 +86,8 @@ class Recovery {
   /// sole stands.
   void LiftOff(const StepInput& input, const PointMotion& from, const Eigen::Matrix3d& rotation);
   void LiftOff(const StepInput& input);
-  /// The foothold where the capture point now says.
+  /// Until its foot leaves the ground a step that catches a push is chosen anew, place and time.
+  /// Then, as a walk's, its foothold is where the capture point now says.
   void Replan(const StepInput& input, const StepState& state);
   void Land(const StepInput& input);
   /// While the landed foot is loaded. True: the other foot leaves, since the landed one carries
@@ -133,8 +134,8 @@ class Recovery {
   /// The first step goes where `plan` says.
   void SetPlan(const StepPlan& plan);
   /// A push while the feet are put side by side: the step catches it from now on. A foot that is
-  /// being unloaded goes on from the load that it has, faster, and comes down as soon as it can.
-  void Hurry(const StepState& state, double time);
+  /// being unloaded goes on from the load that it has, faster.
+  void Hurry(double time);
   void LeadCom(const StepInput& input, const StepState& state);
   double LoweringShare(const StepState& state) const;
 

@@ -35,7 +35,7 @@ StepPlan Recovery::WalkOn(const StepState& state, Foot foot, double unload,
   StepPlan plan = choice_.Stride(state, foot, gait(state), unload);
   *reason = StepReason::kWalk;
   if (std::isfinite(plan.margin) && plan.missed < kMostMissed) return plan;
-  const StepPlan caught = choice_.Next(state, foot);
+  const StepPlan caught = choice_.Next(state, foot, unload);
   if (!caught.possible || !(caught.margin > plan.margin)) return plan;
   *reason = StepReason::kAgain;
   return caught;

@@ -21,6 +21,9 @@ constexpr double kLater = 0.06;       // s, after which a place out of reach is 
 constexpr double kMarginOfTime = 0.05;
 // m by which a swing may cut the corner of the stance leg's room: feet that stand are off by that.
 constexpr double kCut = 0.005;
+// Share of the acceleration that a swing around the stance leg has, which has to keep to its way.
+// With all of it a foot of the paper's robot came down 40 mm short and close to the other one.
+constexpr double kAroundShare = 0.7;
 constexpr double kOffReach = 1e-9;  // m off a polygon that is rounding
 // ωT of a step at most: what the capture point is off by has grown 55 times then, beyond any reach.
 constexpr double kLongest = 4;
@@ -257,17 +260,17 @@ StepPlan StepChoice::Stride(const StepState& state, Foot foot, const Gait& gait,
   return plan;
 }
 
-StepPlan StepChoice::Plan(const StepState& state, Foot foot, Crossing crossing) const {
-  const double unload = state.in_contact[foot] ? limits_.unload : 0;
+StepPlan StepChoice::Plan(const StepState& state, Foot foot, double unload,
+                          Crossing crossing) const {
   double time = unload + limits_.least_swing;
   StepPlan plan;
   for (int i = 0; i < kRounds; ++i) {
     plan = At(state, foot, time, crossing);
     const Vector2d& from = state.sole[foot];
-    const double swing =
-        plan.around
-            ? std::sqrt(CornerAcceleration(from, plan.corner, plan.foothold) / limits_.acceleration)
-            : LeastSwingTime((plan.foothold - from).norm(), limits_.acceleration);
+    const double swing = plan.around
+                             ? std::sqrt(CornerAcceleration(from, plan.corner, plan.foothold) /
+                                         (kAroundShare * limits_.acceleration))
+                             : LeastSwingTime((plan.foothold - from).norm(), limits_.acceleration);
     double needed = unload + std::max(limits_.least_swing, swing);
     // Later the COM is nearer to where the foot has to go.
     if (!std::isfinite(plan.margin)) needed = time + kLater;
@@ -321,11 +324,12 @@ double StepChoice::CostAfter(const StepState& state, const StepPlan& plan, int m
   next.sole[plan.foot] = plan.foothold;
   next.sole_yaw[plan.foot] = plan.yaw;
   next.in_contact = {true, true};
-  Best(next, Other(plan.foot), more - 1, &cost);
+  Best(next, Other(plan.foot), limits_.unload, more - 1, &cost);
   return cost;
 }
 
-StepPlan StepChoice::Best(const StepState& state, Foot foot, int more, double* least) const {
+StepPlan StepChoice::Best(const StepState& state, Foot foot, double unload, int more,
+                          double* least) const {
   StepPlan best;
   const auto consider = [&](const StepPlan& plan) {
     if (!std::isfinite(plan.margin)) return;
@@ -334,12 +338,12 @@ StepPlan StepChoice::Best(const StepState& state, Foot foot, int more, double* l
     best = plan;
     *least = cost;
   };
-  const StepPlan beside = Plan(state, foot);
+  const StepPlan beside = Plan(state, foot, unload);
   consider(beside);
   if (!(limits_.leg_distance > 0) || beside.margin >= limits_.ample_margin) return best;
   const Vector2d away = state.pendulum.capture_point() - state.sole[Other(foot)];
   const double ahead = std::cos(state.yaw) * away.x() + std::sin(state.yaw) * away.y();
-  consider(Plan(state, foot, ahead < 0 ? Crossing::kBehind : Crossing::kInFront));
+  consider(Plan(state, foot, unload, ahead < 0 ? Crossing::kBehind : Crossing::kInFront));
   return best;
 }
 
@@ -349,15 +353,16 @@ StepPlan StepChoice::Choose(const StepState& state) const {
   for (const Foot foot : kFeet) {
     // The stance foot must be there to stand on.
     if (!state.in_contact[Other(foot)]) continue;
-    const StepPlan plan = Best(state, foot, kStepsAhead, &least);
+    const double unload = state.in_contact[foot] ? limits_.unload : 0;
+    const StepPlan plan = Best(state, foot, unload, kStepsAhead, &least);
     if (plan.possible) best = plan;
   }
   return best;
 }
 
-StepPlan StepChoice::Next(const StepState& state, Foot foot) const {
+StepPlan StepChoice::Next(const StepState& state, Foot foot, double unload) const {
   double least = std::numeric_limits<double>::infinity();
-  return Best(state, foot, kStepsAhead, &least);
+  return Best(state, foot, unload, kStepsAhead, &least);
 }
 
 }  // namespace poise::stepping

@@ -98,11 +98,13 @@ class StepChoice {
   /// time cost. Not possible without a foot that can step. A foot that is not in contact swings at
   /// once, from where it is.
   StepPlan Choose(const StepState& state) const;
-  /// Chooses likewise among the plans that begin with `foot`.
-  StepPlan Next(const StepState& state, Foot foot) const;
+  /// Chooses likewise among the plans that begin with `foot`, which leaves the ground in `unload`,
+  /// s.
+  StepPlan Next(const StepState& state, Foot foot, double unload) const;
   /// The step of `foot`, whose least time is iterated from the swing that it takes, around the
   /// stance leg where it must. One that takes longer than the pendulum lets a step be is none.
-  StepPlan Plan(const StepState& state, Foot foot, Crossing crossing = Crossing::kNone) const;
+  StepPlan Plan(const StepState& state, Foot foot, double unload,
+                Crossing crossing = Crossing::kNone) const;
   /// The foothold of `foot` for a touch-down `time` s from now, the centre of pressure at the
   /// stance sole's point nearest to the capture point. Within what both legs span, also
   /// where the COM has left it.
@@ -154,8 +156,9 @@ class StepChoice {
   /// m that the capture point is outside after `plan` and up to `more` steps after it, and what
   /// those cost.
   double CostAfter(const StepState& state, const StepPlan& plan, int more) const;
-  /// The plan that begins with `foot` and costs less than `least`, which becomes its cost.
-  StepPlan Best(const StepState& state, Foot foot, int more, double* least) const;
+  /// The plan that begins with `foot`, after `unload`, s, and costs less than `least`, which
+  /// becomes its cost.
+  StepPlan Best(const StepState& state, Foot foot, double unload, int more, double* least) const;
   /// m between the legs' lines, `foot` at `foothold`, the other at the origin, the COM at `com`, in
   /// axes of the heading.
   double DistanceOfLegs(Foot foot, const Eigen::Vector2d& foothold,

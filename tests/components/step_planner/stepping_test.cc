@@ -259,7 +259,7 @@ TEST_P(ReachCase, NoFootholdIsMuchBetterThanTheChosen) {
     state.pendulum.velocity = speed * Vector2d(std::cos(angle), std::sin(angle));
     state.sole = {Vector2d(0, -0.5 * spacing), Vector2d(0, 0.5 * spacing)};
     for (const Foot foot : kFeet) {
-      const StepPlan plan = choice.Plan(state, foot);
+      const StepPlan plan = choice.Plan(state, foot, limits.unload);
       ASSERT_EQ(plan.foot, foot);
       EXPECT_GE(plan.time, limits.unload + limits.least_swing - 1e-12);
       const auto stance = robot::Index(Other(foot));
