@@ -248,13 +248,14 @@ bool TaskList::Compute(const balance::TaskState& state, const balance::ContactDy
                        const FeetInContact& in_contact, const Eigen::VectorXd* others,
                        std::span<const ForcedJoint> forced) {
   level_rows_.clear();
+  forced = forced.first(std::min<size_t>(forced.size(), kMostForced));
   if (in_contact != written_for_ || forced.size() != num_forced_ || !forced.empty()) {
     jacobian_.setZero();
     written_for_ = in_contact;
     num_forced_ = forced.size();
   }
   Eigen::Index row = 0;
-  for (const ForcedJoint& joint : forced.first(std::min<size_t>(forced.size(), kMostForced))) {
+  for (const ForcedJoint& joint : forced) {
     jacobian_(row, 6 + joint.joint) = 1;
     bias_acceleration_[row] = 0;
     acceleration_[row] = joint.acceleration;
@@ -263,6 +264,7 @@ bool TaskList::Compute(const balance::TaskState& state, const balance::ContactDy
   if (row > 0) level_rows_.push_back(static_cast<int>(row));
   const bool leg_stops = std::ranges::any_of(
       robot::kFeet, [&](Foot f) { return in_contact[f] && KneeStops(f, forced); });
+  FeetInContact raised{false, false};  // whose height has come before all levels
   Eigen::Index com_height = -1;
   const Entry* last = nullptr;
   for (const Entry& entry : entries_) {
@@ -285,7 +287,8 @@ bool TaskList::Compute(const balance::TaskState& state, const balance::ContactDy
     if (entry.type == "com" && leg_stops && com_height < 0) {
       com_height = height;
       --level_rows_.back();
-    } else if (entry.foot && KneeStops(*entry.foot, forced)) {
+    } else if (entry.foot && !raised[*entry.foot] && KneeStops(*entry.foot, forced)) {
+      raised[*entry.foot] = true;
       MoveRow(height, level_rows_.front());
       if (com_height >= 0) ++com_height;
       ++level_rows_.front();

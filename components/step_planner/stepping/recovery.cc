@@ -327,11 +327,13 @@ void Recovery::Replan(const StepInput& input, const StepState& state) {
   }
   Footstep& step = steps_.first();
   if (!swings && !walks) {
-    const StepPlan next = choice_.Next(state, plan_.foot, step.lift_off - input.time);
-    if (!next.possible) return;
+    const double unload = step.lift_off - input.time;
+    StepPlan next = choice_.Next(state, plan_.foot, unload);
+    // Out of reach, the foot still has to be down soon.
+    if (!next.possible) next = choice_.Plan(state, plan_.foot, unload, plan_.crossing);
     step.touch_down = input.time + next.time;
     step.load = step.touch_down + LoadTime();
-    SetPlan(next);
+    if (std::isfinite(next.margin)) SetPlan(next);
     return;
   }
   const double left = step.touch_down - input.time;
