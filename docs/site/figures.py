@@ -537,11 +537,6 @@ def _(task):
     task.each(row)
 
 
-@reads("steps_by_robot", "heron gains")
-def _(task):
-    step_limits(task, "--set step_planner.recovery.enabled=false")
-
-
 @reads("steps_by_robot", "A foot is down")
 def _(task):
     for place, (told, world) in enumerate(((t, w) for t in task.claim.commands() for w in ("ode", "mujoco")), 1):
