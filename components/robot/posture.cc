@@ -234,22 +234,6 @@ double StandingHeight(const RobotModel& model) {
   return data.com.z() - data.foot_pose[Foot::kRight].translation().z();
 }
 
-int Knee(const RobotModel& model, const RobotData& data, Foot foot) {
-  const auto joints = model.supporting_joints(model.feet()[foot].body);
-  // A joint's frame is that of the body that it carries.
-  const auto at = [&](int joint) { return data.body_position[static_cast<size_t>(joint) + 1]; };
-  int knee = -1;
-  double most = -1;
-  for (const int joint : joints) {
-    const double least =
-        std::min((at(joint) - at(joints.front())).norm(), (at(joint) - at(joints.back())).norm());
-    if (least <= most) continue;
-    most = least;
-    knee = joint;
-  }
-  return knee;
-}
-
 double StandingSpacing(const RobotModel& model) {
   if (model.stance().foot_spacing) return *model.stance().foot_spacing;
   RobotData data(model);
@@ -267,6 +251,22 @@ PostureGoal StandingGoal(const RobotModel& model) {
   goal.com_height = StandingHeight(model);
   goal.nominal = model.stance().joint_position;
   return goal;
+}
+
+int Knee(const RobotModel& model, const RobotData& data, Foot foot) {
+  const auto joints = model.supporting_joints(model.feet()[foot].body);
+  // A joint's frame is that of the body that it carries.
+  const auto at = [&](int joint) { return data.body_position[static_cast<size_t>(joint) + 1]; };
+  int knee = -1;
+  double most = -1;
+  for (const int joint : joints) {
+    const double least =
+        std::min((at(joint) - at(joints.front())).norm(), (at(joint) - at(joints.back())).norm());
+    if (least <= most) continue;
+    most = least;
+    knee = joint;
+  }
+  return knee;
 }
 
 }  // namespace poise::robot

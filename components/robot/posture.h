@@ -25,12 +25,12 @@ RobotState SolvePosture(const RobotModel& model, const PostureGoal& goal);
 
 /// m, of the COM above the soles in the robot's stance (RobotModel::stance).
 double StandingHeight(const RobotModel& model);
-/// The joint of a foot's chain that is farthest from both its ends, where the kinematics `data` has
-/// them: a leg's knee. −1: there is none.
-int Knee(const RobotModel& model, const RobotData& data, Foot foot);
 /// m between the soles' centres in that stance.
 double StandingSpacing(const RobotModel& model);
 /// That stance on level ground: soles at ± half the spacing beside the origin, the COM above it.
 PostureGoal StandingGoal(const RobotModel& model);
+/// The joint of a foot's chain that is farthest from both its ends, where the kinematics `data` has
+/// them: a leg's knee. −1: there is none.
+int Knee(const RobotModel& model, const RobotData& data, Foot foot);
 
 }  // namespace poise::robot

@@ -33,8 +33,8 @@ constexpr double kAmpleMargin = 0.04;
 // Share of the hip joints' effort that swings the leg. Fitted: of 360 pushes of six robots 206, 224
 // and 217 stand with 0.75, 0.9 and 1.1 (docs/lab/steps).
 constexpr double kSwingEffort = 0.9;
-// Likewise in a walk, whose steps take longer in place of more effort: with 0.9 Talos walks at 0.75
-// m/s for 0.31 of its weight and way, with 0.42 for 0.29, and the paper's robot for 0.50 and 0.40.
+// A walk's steps have less, and take longer. With 0.9 Talos walks at 0.75 m/s for 0.31 of its
+// weight and way, with 0.42 for 0.29; the paper's robot for 0.50 and 0.40.
 constexpr double kStrideEffort = 0.42;
 // s of the ramp (61) before a foot leaves the ground, and s in the air at least. On a point mass
 // shorter ones catch no more (docs/lab/steps/2026-11-28-level-feet.md).

@@ -320,6 +320,19 @@ TEST(TaskController, JointsThatAreNoLegsFollowTheirPosture) {
   }
 }
 
+/// Torque of the paper's robot at `state`, with `limits` in its configuration.
+Eigen::VectorXd TorqueAt(const robot::RobotModel& model, const support_plan_t& plan,
+                         const robot::RobotState& state, const char* limits) {
+  ControlContext context(TestRobot::kDyros);
+  Harness<TaskController> harness(&context, TaskControllerText() + limits);
+  harness.Bind("support_plan", &plan);
+  const robot_state_t message = StateMessage(model, state);
+  harness.Bind("robot_state", &message);
+  harness.Run(TickAt(0));
+  EXPECT_EQ(harness.output<task_torque_t>().status, task_torque_t::STATUS_OK);
+  return ToEigen(harness.output<task_torque_t>().torque);
+}
+
 // A joint that rushes at its limit is stopped where the soles stand, since then the body moves with
 // it; where a sole turns with the joint, stopping it by the body would throw the robot over.
 TEST(TaskController, ASoleThatTurnsIsNotStoppedByTheBody) {
@@ -330,14 +343,7 @@ TEST(TaskController, ASoleThatTurnsIsNotStoppedByTheBody) {
   const robot::RobotData data = robot::Evaluate(model, standing);
   const support_plan_t plan = HoldAt(model, data, {true, true});
   const auto torque = [&](const robot::RobotState& state, const char* limits) {
-    ControlContext context(TestRobot::kDyros);
-    Harness<TaskController> harness(&context, TaskControllerText() + limits);
-    harness.Bind("support_plan", &plan);
-    const robot_state_t message = StateMessage(model, state);
-    harness.Bind("robot_state", &message);
-    harness.Run(TickAt(0));
-    EXPECT_EQ(harness.output<task_torque_t>().status, task_torque_t::STATUS_OK);
-    return ToEigen(harness.output<task_torque_t>().torque);
+    return TorqueAt(model, plan, state, limits);
   };
   constexpr double kSpeed = 8;  // rad/s, beyond what can be stopped before the limit
   robot::RobotState state = standing;
@@ -375,15 +381,8 @@ struct StoppedKnee {
     const support_plan_t plan = HoldAt(model, data, left);
     const Dynamics dynamics(model, state, left);
     const auto acceleration = [&](const char* limits) {
-      ControlContext context(TestRobot::kDyros);
-      Harness<TaskController> harness(&context, TaskControllerText() + limits);
-      harness.Bind("support_plan", &plan);
-      const robot_state_t message = StateMessage(model, state);
-      harness.Bind("robot_state", &message);
-      harness.Run(TickAt(0));
-      EXPECT_EQ(harness.output<task_torque_t>().status, task_torque_t::STATUS_OK);
       Eigen::VectorXd q, wrench;
-      dynamics.Forward(ToEigen(harness.output<task_torque_t>().torque), &q, &wrench);
+      dynamics.Forward(TorqueAt(model, plan, state, limits), &q, &wrench);
       return q;
     };
     const Eigen::VectorXd change = acceleration("") - acceleration("joint_limits: false");
