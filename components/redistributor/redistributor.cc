@@ -69,6 +69,7 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   }
 
   impedance_ = PlannedImpedance(config.impedance(), *model_, context.tick_period);
+  yielding_legs_ = YieldingLegs(*model_);
   swing_friction_ = SwingFriction(config.friction_compensation(), *model_, context.tick_period);
   whole_body_ = context.shared->Get<balance::WholeBody>(
       "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
@@ -143,6 +144,7 @@ void Redistributor::Redistribute(const Tick& tick) {
     return;
   }
   out.status = Count(in_contact) == 2 ? ComputeDouble(tick) : ComputeSingle(in_contact);
+  yielding_legs_.Yield(in_contact, *robot_state_, &out);
   const bool ramped = support_plan_->transition != support_plan_t::TRANSITION_NONE;
   swing_friction_.Ramp(in_contact, ramped, out.eta);
   if (impedance_.enabled() || swing_friction_.acts()) FollowMotion(in_contact);

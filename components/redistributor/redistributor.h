@@ -15,6 +15,7 @@
 #include "components/redistributor/ratio_moves.h"
 #include "components/redistributor/shared_impedance.h"
 #include "components/redistributor/swing_friction.h"
+#include "components/redistributor/yielding_legs.h"
 #include "components/robot/robot_model.h"
 #include "poise/balance_torque_t.hpp"
 #include "poise/joint_command_t.hpp"
@@ -24,10 +25,11 @@
 namespace poise {
 
 /// ROBOT_STATE, SUPPORT_PLAN, BALANCE_TORQUE -> JOINT_COMMAND. In single support the torque passes
-/// through. With STATUS_INVALID_INPUT (the balance torque is held or not finite) the last good
-/// command is sent again; when there is a fresh torque but no resultant, that torque
-/// passes through undistributed, with the same status. The hardware bridge refuses either as stale:
-/// it holds its last accepted command for a few cycles, then damps the joints, then stops.
+/// through. A leg yields whose foot the ground does not bear (YieldingLegs). With
+/// STATUS_INVALID_INPUT (the balance torque is held or not finite) the last good command is sent
+/// again; when there is a fresh torque but no resultant, that torque passes through undistributed,
+/// with the same status. The hardware bridge refuses either as stale: it holds its last accepted
+/// command for a few cycles, then damps the joints, then stops.
 class Redistributor : public Component, public Operated {
  public:
   void Configure(const ComponentContext& context, Wiring* wiring) override;
@@ -81,6 +83,7 @@ class Redistributor : public Component, public Operated {
   RatioMoves ratio_moves_;
   InternalFeedback feedback_;
   PlannedImpedance impedance_;
+  YieldingLegs yielding_legs_;
   SwingFriction swing_friction_;
   double feedback_pause_ = 0;  // s
   double feedback_edge_ = 0;   // m

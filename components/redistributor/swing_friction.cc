@@ -25,11 +25,7 @@ SwingFriction::SwingFriction(const FrictionCompensation& config, const robot::Ro
       fade_load_(config.fade_load()) {
   if (share_ == 0) return;
   for (int j = 0; j < model.num_joints(); ++j) {
-    Joint joint{.index = j, .motor = model.motors()[static_cast<size_t>(j)]};
-    for (const Foot f : kFeet) {
-      const std::span<const int> leg = model.supporting_joints(model.feet()[f].body);
-      joint.carries[f] = std::ranges::find(leg, j) != leg.end();
-    }
+    const Joint joint{j, model.CarriedFeet(j), model.motors()[static_cast<size_t>(j)]};
     if (Count(joint.carries) > 0) joints_.push_back(joint);
   }
 }

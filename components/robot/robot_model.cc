@@ -40,6 +40,15 @@ void RobotModel::BuildTree() {
   }
 }
 
+FootArray<bool> RobotModel::CarriedFeet(int joint) const {
+  FootArray<bool> carried;
+  for (const Foot f : kFeet) {
+    carried[f] = std::ranges::find(supporting_joints(feet()[f].body), joint) !=
+                 supporting_joints(feet()[f].body).end();
+  }
+  return carried;
+}
+
 const Frame* RobotModel::FindFrame(std::string_view name) const {
   const auto frame = std::find_if(parts_.frames.begin(), parts_.frames.end(),
                                   [&](const Frame& other) { return other.name == name; });

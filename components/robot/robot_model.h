@@ -188,6 +188,8 @@ class RobotModel {
   std::span<const int> supporting_joints(int body) const {
     return tree_.supporting_joints[static_cast<size_t>(body)];
   }
+  /// The feet that a joint carries: it lies between them and the base.
+  FootArray<bool> CarriedFeet(int joint) const;
   /// Every link of the URDF, in order of the names.
   const std::vector<Frame>& frames() const { return parts_.frames; }
   /// A link by its URDF name; null when there is none.

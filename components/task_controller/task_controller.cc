@@ -75,12 +75,7 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
   }
   const balance::JointLimits limits(*model_, balance::LimitHorizon(*model_, context.tick_period));
   if (config.joint_limits()) limits_ = limits;
-  for (const Foot f : kFeet) {
-    leg_[f].assign(static_cast<size_t>(num_joints), 0);
-    for (const int joint : model_->supporting_joints(model_->feet()[f].body)) {
-      leg_[f][static_cast<size_t>(joint)] = 1;
-    }
-  }
+  for (int j = 0; j < num_joints; ++j) carries_.push_back(model_->CarriedFeet(j));
 
   whole_body_ = context.shared->Get<balance::WholeBody>(
       "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
@@ -276,7 +271,7 @@ bool TaskController::FindLimits() {
 
 bool TaskController::Stands(int joint) const {
   const auto j = static_cast<size_t>(joint);
-  return std::ranges::any_of(kFeet, [&](Foot f) { return in_contact_[f] && leg_[f][j] != 0; });
+  return std::ranges::any_of(kFeet, [&](Foot f) { return in_contact_[f] && carries_[j][f]; });
 }
 
 bool TaskController::SoleTurns(int joint) const {
@@ -284,7 +279,7 @@ bool TaskController::SoleTurns(int joint) const {
   const robot::RobotData& data = whole_body_->data();
   const double speed = state_.joint_velocity[joint];
   for (const Foot f : kFeet) {
-    if (!in_contact_[f] || leg_[f][j] == 0) continue;
+    if (!in_contact_[f] || !carries_[j][f]) continue;
     const double turn = data.foot_velocity[f].tail<3>().dot(data.joint_axis[j]);
     if (std::abs(turn) > kSoleRate && turn * speed > kSoleShare * speed * speed) return true;
   }

@@ -75,7 +75,7 @@ class TaskController : public Component, public Operated {
   std::optional<balance::JointLimits> limits_;  // none: they do not enter the control
   std::array<TaskList::ForcedJoint, TaskList::kMostForced> forced_;
   size_t num_forced_ = 0;
-  robot::FootArray<std::vector<char>> leg_;  // the joint lies between the foot and the base
+  std::vector<robot::FootArray<bool>> carries_;  // by joint
   Eigen::VectorXd acceleration_;             // n×1
   Eigen::VectorXd posture_acceleration_, posture_torque_;
   Eigen::VectorXd torque_, free_torque_;

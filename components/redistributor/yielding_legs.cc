@@ -1,0 +1,54 @@
+#include "components/redistributor/yielding_legs.h"
+
+#include <algorithm>
+
+namespace poise {
+namespace {
+
+using robot::Foot;
+using robot::FootArray;
+using robot::kFeet;
+
+constexpr double kLoadShare = 0.6;   // of the command, below which a leg yields; chosen
+constexpr double kLightLoad = 0.1;   // of the weight: what a foot bears of so little is no sign
+constexpr double kDeviations = 2;    // of the reading, which may show less than the foot bears
+constexpr double kYieldTime = 5e-3;  // s, rotor's inertia over damping
+
+}  // namespace
+
+YieldingLegs::YieldingLegs(const robot::RobotModel& model)
+    : light_load_(kLightLoad * model.total_mass() * robot::kGravity) {
+  for (int j = 0; j < model.num_joints(); ++j) {
+    const auto index = static_cast<size_t>(j);
+    Joint joint{.index = index, .carries = model.CarriedFeet(j)};
+    joint.damping = model.motors()[index].reflected_inertia / kYieldTime;
+    if (Count(joint.carries) > 0) joints_.push_back(joint);
+  }
+}
+
+double YieldingLegs::BorneShare(size_t foot, const robot_state_t& measured,
+                                const joint_command_t& command) const {
+  const double most = -measured.foot_wrench[foot].force[2] +
+                      kDeviations * measured.foot_wrench_deviation[foot].force[2];
+  const double needed = kLoadShare * (-command.foot_wrench[foot].force[2] - light_load_);
+  return needed > 0 && most < needed ? std::max(most, 0.0) / needed : 1;
+}
+
+void YieldingLegs::Yield(const FootArray<bool>& in_contact, const robot_state_t& measured,
+                         joint_command_t* command) const {
+  FootArray<double> borne(0.0);
+  for (const Foot f : kFeet) {
+    if (in_contact[f]) borne[f] = BorneShare(Index(f), measured, *command);
+  }
+  for (const Joint& joint : joints_) {
+    double share = -1;
+    for (const Foot f : kFeet) {
+      if (in_contact[f] && joint.carries[f]) share = std::max(share, borne[f]);
+    }
+    if (share < 0 || share == 1) continue;
+    double& torque = command->torque[joint.index];
+    torque = share * torque - (1 - share) * joint.damping * measured.joint_velocity[joint.index];
+  }
+}
+
+}  // namespace poise

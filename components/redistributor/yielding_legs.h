@@ -1,0 +1,45 @@
+// What becomes of a leg's torque where the ground does not bear its foot.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "components/robot/robot_model.h"
+#include "poise/joint_command_t.hpp"
+#include "poise/robot_state_t.hpp"
+
+namespace poise {
+
+/// (53) takes each foot in contact for fixed to the ground. One that a push lifts, kicks away or
+/// leaves without load has nothing to press against, and its torque throws the leg instead. So it
+/// is given in proportion to what the foot surely lacks,
+///   τ = s τ_(53) − (1 − s) d q̇,  s = (F + 2 σ) / (0.6 (F_c − m g / 10)), 0 ≤ s ≤ 1,
+/// with F and F_c, N, the measured and the commanded force on the sole, σ the reading's standard
+/// deviation, and d, N·m·s/rad, the inertia of the joint's rotor over 5 ms, as the bridge damps.
+/// A foot that bears more than 0.6 of its load, or is to bear next to none, changes nothing. A leg
+/// that yields still loads its foot: it gets more of its torque than the foot bears of its load.
+class YieldingLegs {
+ public:
+  YieldingLegs() = default;  ///< none
+  explicit YieldingLegs(const robot::RobotModel& model);
+
+  /// Changes `command`'s torque; its foot_wrench is what is commanded. `joint_velocity`: rad/s. A
+  /// joint that carries both feet yields with the one that bears more of its load.
+  void Yield(const robot::FootArray<bool>& in_contact, const robot_state_t& measured,
+             joint_command_t* command) const;
+
+ private:
+  struct Joint {
+    size_t index = 0;
+    robot::FootArray<bool> carries{};
+    double damping = 0;  // N·m·s/rad
+  };
+  /// s of a foot in contact.
+  double BorneShare(size_t foot, const robot_state_t& measured,
+                    const joint_command_t& command) const;
+
+  std::vector<Joint> joints_;  // of the legs
+  double light_load_ = 0;      // N
+};
+
+}  // namespace poise

@@ -1,0 +1,109 @@
+// What a leg is given whose foot the ground does not bear: closed forms of its definition, and the
+// power that such a leg can take.
+#include "components/redistributor/yielding_legs.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <random>
+
+#include "tests/components/control_fixture.h"
+#include "tests/test_seed.h"
+
+namespace poise {
+namespace {
+
+using robot::Foot;
+using robot::TestRobot;
+
+constexpr robot::FootArray<bool> kBoth(true);
+constexpr double kAsked = 250;  // N on each foot
+
+class YieldingLegsTest : public testing::Test {
+ protected:
+  YieldingLegsTest() {
+    MessageTraits<joint_command_t>::Resize(command_, std::array{model_.num_joints(), 2});
+    std::uniform_real_distribution<double> value(-1, 1);
+    for (double& torque : command_.torque) torque = 50 * value(random_);
+    for (double& velocity : measured_.joint_velocity) velocity = 3 * value(random_);
+    for (wrench_t& wrench : command_.foot_wrench) wrench.force[2] = -kAsked;
+    Bear(kAsked, kAsked);
+  }
+  void Bear(double right, double left) {
+    measured_.foot_wrench[0].force[2] = -right;
+    measured_.foot_wrench[1].force[2] = -left;
+  }
+  std::vector<double> Yielded(const robot::FootArray<bool>& in_contact = kBoth) const {
+    joint_command_t command = command_;
+    YieldingLegs(model_).Yield(in_contact, measured_, &command);
+    return command.torque;
+  }
+  /// By the joints' names.
+  std::vector<bool> Leg(Foot foot) const {
+    std::vector<bool> leg;
+    for (const robot::Joint& joint : model_.joints()) {
+      leg.push_back(joint.name.starts_with(foot == Foot::kRight ? "right_" : "left_"));
+    }
+    return leg;
+  }
+  /// N that leave a foot's torque as it is.
+  double Needed() const { return 0.6 * (kAsked - 0.1 * model_.total_mass() * robot::kGravity); }
+  double Damping(size_t joint) const { return model_.motors()[joint].reflected_inertia / 0.005; }
+
+  std::mt19937 random_{TestSeed(53)};
+  robot::RobotModel model_ = robot::LoadTestRobot(TestRobot::kDyros);
+  robot_state_t measured_ = StateMessage(model_, StandingState(model_));
+  joint_command_t command_{};
+};
+
+TEST_F(YieldingLegsTest, AFootThatBearsMostLeavesEveryBitOfTheTorque) {
+  Bear(0.6 * kAsked, 5 * kAsked);
+  EXPECT_EQ(Yielded(), command_.torque);
+  Bear(Needed() + 1e-9, kAsked);
+  EXPECT_EQ(Yielded(), command_.torque);
+}
+
+TEST_F(YieldingLegsTest, AFootWithoutLoadDampsItsLegAlone) {
+  Bear(0, kAsked);
+  const std::vector<double> torque = Yielded();
+  const std::vector<bool> right = Leg(Foot::kRight);
+  for (size_t j = 0; j < torque.size(); ++j) {
+    const double expected =
+        right[j] ? -Damping(j) * measured_.joint_velocity[j] : command_.torque[j];
+    EXPECT_DOUBLE_EQ(torque[j], expected) << j;
+    if (right[j]) EXPECT_LE(torque[j] * measured_.joint_velocity[j], 0) << "it takes power";
+  }
+}
+
+TEST_F(YieldingLegsTest, LessIsGivenInProportion) {
+  Bear(kAsked, 0.25 * Needed());
+  const std::vector<double> torque = Yielded();
+  const std::vector<bool> left = Leg(Foot::kLeft);
+  for (size_t j = 0; j < torque.size(); ++j) {
+    const double expected =
+        left[j] ? 0.25 * command_.torque[j] - 0.75 * Damping(j) * measured_.joint_velocity[j]
+                : command_.torque[j];
+    EXPECT_NEAR(torque[j], expected, 1e-12) << j;
+  }
+}
+
+TEST_F(YieldingLegsTest, WhatAReadingMayHideIsBorne) {
+  Bear(0, kAsked);
+  measured_.foot_wrench_deviation[0].force[2] = Needed() / 2;
+  EXPECT_EQ(Yielded(), command_.torque);
+}
+
+TEST_F(YieldingLegsTest, NothingYieldsThatIsNotAsked) {
+  Bear(0, 0);
+  EXPECT_EQ(Yielded({false, false}), command_.torque) << "swinging feet";
+  for (wrench_t& wrench : command_.foot_wrench) {
+    wrench.force[2] = -0.1 * model_.total_mass() * robot::kGravity;
+  }
+  EXPECT_EQ(Yielded(), command_.torque) << "feet that are to bear next to nothing";
+  for (wrench_t& wrench : command_.foot_wrench) wrench.force[2] = -kAsked;
+  Bear(std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN());
+  EXPECT_EQ(Yielded(), command_.torque) << "a reading that is no number";
+}
+
+}  // namespace
+}  // namespace poise
