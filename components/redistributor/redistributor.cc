@@ -111,6 +111,7 @@ void Redistributor::TakeActs(const Tick& tick) {
 bool Redistributor::Archive(StateArchive* archive) {
   operator_.Archive(archive);
   feedback_.Archive(archive);
+  yielding_legs_.Archive(archive);
   swing_friction_.Archive(archive);
   archive->Show(last_index_, last_time_, last_eta_, learn_from_, landed_foot_);
   ArchiveMessage(&*joint_command_, archive);

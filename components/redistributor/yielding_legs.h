@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "components/framework/state_archive.h"
 #include "components/robot/robot_model.h"
 #include "poise/joint_command_t.hpp"
 #include "poise/robot_state_t.hpp"
@@ -16,17 +17,20 @@ namespace poise {
 ///   τ = s τ_(53) − (1 − s) d q̇,  s = (F + 2 σ) / (0.6 (F_c − m g / 10)), 0 ≤ s ≤ 1,
 /// with F and F_c, N, the measured and the commanded force on the sole, σ the reading's standard
 /// deviation, and d, N·m·s/rad, the inertia of the joint's rotor over 5 ms, as the bridge damps.
-/// A foot that bears more than 0.6 of its load, or is to bear next to none, changes nothing. A leg
-/// that yields still loads its foot: it gets more of its torque than the foot bears of its load.
+/// A foot that bears more than 0.6 of its load, or is to bear next to none, changes nothing. Nor
+/// does one that has not yet borne what it was asked for, 0.3 of the weight at least, since it
+/// landed: it may be a millimetre above the ground, which its torque has to find. A leg that yields
+/// still loads its foot: it gets more of its torque than the foot bears of its load.
 class YieldingLegs {
  public:
   YieldingLegs() = default;  ///< none
   explicit YieldingLegs(const robot::RobotModel& model);
 
-  /// Changes `command`'s torque; its foot_wrench is what is commanded. `joint_velocity`: rad/s. A
-  /// joint that carries both feet yields with the one that bears more of its load.
+  /// Once a tick. Changes `command`'s torque; its foot_wrench is what is commanded. A joint that
+  /// carries both feet yields with the one that bears more of its load.
   void Yield(const robot::FootArray<bool>& in_contact, const robot_state_t& measured,
-             joint_command_t* command) const;
+             joint_command_t* command);
+  void Archive(StateArchive* archive) { archive->Show(has_borne_); }
 
  private:
   struct Joint {
@@ -35,11 +39,12 @@ class YieldingLegs {
     double damping = 0;  // N·m·s/rad
   };
   /// s of a foot in contact.
-  double BorneShare(size_t foot, const robot_state_t& measured,
-                    const joint_command_t& command) const;
+  double BorneShare(robot::Foot foot, const robot_state_t& measured,
+                    const joint_command_t& command);
 
-  std::vector<Joint> joints_;  // of the legs
-  double light_load_ = 0;      // N
+  std::vector<Joint> joints_;              // of the legs
+  double light_load_ = 0, full_load_ = 0;  // N
+  robot::FootArray<bool> has_borne_;       // 0.3 of the weight, since it is in contact
 };
 
 }  // namespace poise

@@ -35,8 +35,19 @@ class YieldingLegsTest : public testing::Test {
   }
   std::vector<double> Yielded(const robot::FootArray<bool>& in_contact = kBoth) const {
     joint_command_t command = command_;
-    YieldingLegs(model_).Yield(in_contact, measured_, &command);
+    YieldingLegs legs = Standing();
+    legs.Yield(in_contact, measured_, &command);
     return command.torque;
+  }
+  /// Both feet have borne their load since they landed.
+  YieldingLegs Standing() const {
+    joint_command_t command = command_;
+    for (wrench_t& wrench : command.foot_wrench) wrench.force[2] = -kAsked;
+    robot_state_t borne = measured_;
+    for (wrench_t& wrench : borne.foot_wrench) wrench.force[2] = -kAsked;
+    YieldingLegs legs(model_);
+    legs.Yield(kBoth, borne, &command);
+    return legs;
   }
   /// By the joints' names.
   std::vector<bool> Leg(Foot foot) const {
@@ -91,6 +102,23 @@ TEST_F(YieldingLegsTest, WhatAReadingMayHideIsBorne) {
   Bear(0, kAsked);
   measured_.foot_wrench_deviation[0].force[2] = Needed() / 2;
   EXPECT_EQ(Yielded(), command_.torque);
+}
+
+// A foot that was told down a millimetre early has to find the ground by its torque.
+TEST_F(YieldingLegsTest, AFootThatLandsPressesUntilItHasBorneItsLoad) {
+  YieldingLegs legs = Standing();
+  const auto torque = [&](const robot::FootArray<bool>& in_contact, double left, double asked) {
+    joint_command_t command = command_;
+    command.foot_wrench[1].force[2] = -asked;
+    Bear(kAsked, left);
+    legs.Yield(in_contact, measured_, &command);
+    return command.torque;
+  };
+  torque({true, false}, 0, 0);
+  EXPECT_EQ(torque(kBoth, 300, 5), command_.torque) << "an impact";
+  EXPECT_EQ(torque(kBoth, 0, kAsked), command_.torque) << "it is not on the ground";
+  EXPECT_EQ(torque(kBoth, kAsked, kAsked), command_.torque);
+  EXPECT_NE(torque(kBoth, 0, kAsked), command_.torque) << "it was, and is kicked away";
 }
 
 TEST_F(YieldingLegsTest, NothingYieldsThatIsNotAsked) {
