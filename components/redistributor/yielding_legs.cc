@@ -1,6 +1,7 @@
 #include "components/redistributor/yielding_legs.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace poise {
 namespace {
@@ -9,16 +10,18 @@ using robot::Foot;
 using robot::FootArray;
 using robot::kFeet;
 
-constexpr double kLoadShare = 0.6;   // of the command, below which a leg yields; chosen
-constexpr double kLightLoad = 0.1;   // of the weight: what a foot bears of so little is no sign
-constexpr double kFullLoad = 0.3;    // of the weight: who is to bear it and does is on the ground
-constexpr double kDeviations = 2;    // of the reading, which may show less than the foot bears
-constexpr double kYieldTime = 5e-3;  // s, rotor's inertia over damping
+constexpr double kLoadShare = 0.6;     // of the command, below which a leg yields; chosen
+constexpr double kLightLoad = 0.1;     // of the weight: what a foot bears of so little is no sign
+constexpr double kFullLoad = 0.3;      // of the weight: who is to bear it and does is on the ground
+constexpr double kBounceTime = 10e-3;  // s over which a load is averaged: bounces are shorter
+constexpr double kDeviations = 2;      // of the reading, which may show less than the foot bears
+constexpr double kYieldTime = 5e-3;    // s, rotor's inertia over damping
 
 }  // namespace
 
-YieldingLegs::YieldingLegs(const robot::RobotModel& model)
-    : light_load_(kLightLoad * model.total_mass() * robot::kGravity),
+YieldingLegs::YieldingLegs(const robot::RobotModel& model, double period)
+    : load_gain_(1 - std::exp(-period / kBounceTime)),
+      light_load_(kLightLoad * model.total_mass() * robot::kGravity),
       full_load_(kFullLoad * model.total_mass() * robot::kGravity) {
   for (int j = 0; j < model.num_joints(); ++j) {
     const auto index = static_cast<size_t>(j);
@@ -31,11 +34,11 @@ YieldingLegs::YieldingLegs(const robot::RobotModel& model)
 double YieldingLegs::BorneShare(Foot foot, const robot_state_t& measured,
                                 const joint_command_t& command) {
   const size_t i = Index(foot);
-  const double most =
-      -measured.foot_wrench[i].force[2] + kDeviations * measured.foot_wrench_deviation[i].force[2];
+  const double hidden = kDeviations * measured.foot_wrench_deviation[i].force[2];
+  const double now = -measured.foot_wrench[i].force[2] + hidden, most = load_[foot] + hidden;
   const double asked = -command.foot_wrench[i].force[2];
   const double needed = kLoadShare * (asked - light_load_);
-  if (asked > full_load_ && most >= needed) has_borne_[foot] = true;
+  if (asked > full_load_ && std::min(now, most) >= needed) has_borne_[foot] = true;
   return has_borne_[foot] && needed > 0 && most < needed ? std::max(most, 0.0) / needed : 1;
 }
 
@@ -43,6 +46,8 @@ void YieldingLegs::Yield(const FootArray<bool>& in_contact, const robot_state_t&
                          joint_command_t* command) {
   FootArray<double> borne(0.0);
   for (const Foot f : kFeet) {
+    const double load = -measured.foot_wrench[Index(f)].force[2];
+    if (std::isfinite(load)) load_[f] += load_gain_ * (load - load_[f]);
     has_borne_[f] = has_borne_[f] && in_contact[f];
     if (in_contact[f]) borne[f] = BorneShare(f, measured, *command);
   }

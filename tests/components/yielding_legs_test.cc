@@ -17,7 +17,8 @@ using robot::Foot;
 using robot::TestRobot;
 
 constexpr robot::FootArray<bool> kBoth(true);
-constexpr double kAsked = 250;  // N on each foot
+constexpr double kTickPeriod = 2e-3;  // s
+constexpr double kAsked = 250;    // N on each foot
 
 class YieldingLegsTest : public testing::Test {
  protected:
@@ -34,9 +35,17 @@ class YieldingLegsTest : public testing::Test {
     measured_.foot_wrench[1].force[2] = -left;
   }
   std::vector<double> Yielded(const robot::FootArray<bool>& in_contact = kBoth) const {
-    joint_command_t command = command_;
     YieldingLegs legs = Standing();
-    legs.Yield(in_contact, measured_, &command);
+    return Settled(&legs, in_contact, command_);
+  }
+  /// After 0.2 s of the same load, 20 times what it is averaged over.
+  std::vector<double> Settled(YieldingLegs* legs, const robot::FootArray<bool>& in_contact,
+                              const joint_command_t& given) const {
+    joint_command_t command;
+    for (int tick = 0; tick < 100; ++tick) {
+      command = given;
+      legs->Yield(in_contact, measured_, &command);
+    }
     return command.torque;
   }
   /// Both feet have borne their load since they landed.
@@ -45,8 +54,8 @@ class YieldingLegsTest : public testing::Test {
     for (wrench_t& wrench : command.foot_wrench) wrench.force[2] = -kAsked;
     robot_state_t borne = measured_;
     for (wrench_t& wrench : borne.foot_wrench) wrench.force[2] = -kAsked;
-    YieldingLegs legs(model_);
-    legs.Yield(kBoth, borne, &command);
+    YieldingLegs legs(model_, kTickPeriod);
+    for (int tick = 0; tick < 100; ++tick) legs.Yield(kBoth, borne, &command);
     return legs;
   }
   /// By the joints' names.
@@ -70,7 +79,7 @@ class YieldingLegsTest : public testing::Test {
 TEST_F(YieldingLegsTest, AFootThatBearsMostLeavesEveryBitOfTheTorque) {
   Bear(0.6 * kAsked, 5 * kAsked);
   EXPECT_EQ(Yielded(), command_.torque);
-  Bear(Needed() + 1e-9, kAsked);
+  Bear(Needed() + 1e-3, kAsked);
   EXPECT_EQ(Yielded(), command_.torque);
 }
 
@@ -81,7 +90,7 @@ TEST_F(YieldingLegsTest, AFootWithoutLoadDampsItsLegAlone) {
   for (size_t j = 0; j < torque.size(); ++j) {
     const double expected =
         right[j] ? -Damping(j) * measured_.joint_velocity[j] : command_.torque[j];
-    EXPECT_DOUBLE_EQ(torque[j], expected) << j;
+    EXPECT_NEAR(torque[j], expected, 1e-6) << j;
     if (right[j]) EXPECT_LE(torque[j] * measured_.joint_velocity[j], 0) << "it takes power";
   }
 }
@@ -94,13 +103,13 @@ TEST_F(YieldingLegsTest, LessIsGivenInProportion) {
     const double expected =
         left[j] ? 0.25 * command_.torque[j] - 0.75 * Damping(j) * measured_.joint_velocity[j]
                 : command_.torque[j];
-    EXPECT_NEAR(torque[j], expected, 1e-12) << j;
+    EXPECT_NEAR(torque[j], expected, 1e-6) << j;
   }
 }
 
 TEST_F(YieldingLegsTest, WhatAReadingMayHideIsBorne) {
   Bear(0, kAsked);
-  measured_.foot_wrench_deviation[0].force[2] = Needed() / 2;
+  measured_.foot_wrench_deviation[0].force[2] = Needed() / 2 + 1e-3;
   EXPECT_EQ(Yielded(), command_.torque);
 }
 
@@ -111,14 +120,23 @@ TEST_F(YieldingLegsTest, AFootThatLandsPressesUntilItHasBorneItsLoad) {
     joint_command_t command = command_;
     command.foot_wrench[1].force[2] = -asked;
     Bear(kAsked, left);
-    legs.Yield(in_contact, measured_, &command);
-    return command.torque;
+    return Settled(&legs, in_contact, command);
   };
   torque({true, false}, 0, 0);
   EXPECT_EQ(torque(kBoth, 300, 5), command_.torque) << "an impact";
   EXPECT_EQ(torque(kBoth, 0, kAsked), command_.torque) << "it is not on the ground";
   EXPECT_EQ(torque(kBoth, kAsked, kAsked), command_.torque);
   EXPECT_NE(torque(kBoth, 0, kAsked), command_.torque) << "it was, and is kicked away";
+}
+
+TEST_F(YieldingLegsTest, AFootThatBouncesStands) {
+  YieldingLegs legs = Standing();
+  for (int tick = 0; tick < 20; ++tick) {
+    joint_command_t command = command_;
+    Bear(tick % 2 == 0 ? 0 : 2 * kAsked, kAsked);
+    legs.Yield(kBoth, measured_, &command);
+    ASSERT_EQ(command.torque, command_.torque) << tick;
+  }
 }
 
 TEST_F(YieldingLegsTest, NothingYieldsThatIsNotAsked) {
