@@ -12,8 +12,8 @@ namespace {
 
 using Status = bridge_status_t;
 
-// s over which a joint's speed is averaged before it stops the robot: a blow on an arm throws it
-// faster than any motor, and is over by then. A robot that falls for it has lost more.
+// s, of the low-pass on the speed of a joint that stops the robot: a blow on an arm throws it
+// faster than any motor, and is shorter. A robot that falls for it has lost more.
 constexpr double kSpeedTime = 0.1;
 
 /// By Refusal.
@@ -113,8 +113,11 @@ void Supervisor::CheckMotion(const drive_feedback_t& feedback) {
   tilt_.Update(Eigen::Map<const Eigen::Vector3d>(feedback.imu_angular_velocity),
                Eigen::Map<const Eigen::Vector3d>(feedback.imu_acceleration), config_.period);
   for (size_t j = 0; j < faulted_.size(); ++j) {
+    if (!active()) {
+      mean_speed_[j] = 0;
+      continue;
+    }
     mean_speed_[j] += speed_gain_ * (std::abs(joint_velocity()[j]) - mean_speed_[j]);
-    if (!active()) continue;
     const auto joint = static_cast<int>(j);
     if (!Inside(j)) Latch(Status::STATE_STOPPING, Status::REASON_JOINT_POSITION, joint);
     if (mean_speed_[j] > TripSpeed(j)) {
@@ -437,8 +440,9 @@ double Supervisor::FadePosition(size_t joint, double torque) const {
 double Supervisor::FadeVelocity(size_t joint, double torque) const {
   const double velocity = joint_velocity()[joint], speed = std::abs(velocity);
   const double limit = config_.velocity_limit[joint], trip = TripSpeed(joint);
-  if (torque * velocity <= 0 || speed <= std::min(limit, trip)) return torque;
-  return speed < trip ? torque * (trip - speed) / (trip - limit) : 0;
+  if (torque * velocity <= 0) return torque;
+  if (speed >= trip) return 0;
+  return speed <= limit ? torque : torque * (1 - (speed - limit) / (trip - limit));
 }
 
 double Supervisor::Limit(size_t joint, double wanted, int8_t* limits) const {

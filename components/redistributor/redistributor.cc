@@ -145,10 +145,11 @@ void Redistributor::Redistribute(const Tick& tick) {
     return;
   }
   out.status = Count(in_contact) == 2 ? ComputeDouble(tick) : ComputeSingle(in_contact);
-  yielding_legs_.Yield(in_contact, *robot_state_, &out);
   const bool ramped = support_plan_->transition != support_plan_t::TRANSITION_NONE;
   swing_friction_.Ramp(in_contact, ramped, out.eta);
   if (impedance_.enabled() || swing_friction_.acts()) FollowMotion(in_contact);
+  // Last: the motion above is planned on feet that the ground bears.
+  yielding_legs_.Yield(in_contact, *robot_state_, &out);
 }
 
 void Redistributor::FollowMotion(const FootArray<bool>& in_contact) {
@@ -289,8 +290,8 @@ void Redistributor::AddFeedback(const Tick& tick, const FootArray<Eigen::Isometr
   joint_command_t& out = *joint_command_;
   InternalWrench answer = InternalWrench::Zero();
   const double share = FeedbackShare(out.eta);
-  // Soles about to tip share their load as they can, not as commanded.
-  const bool tipping = AboutToTip(desired);
+  // Soles about to tip, and legs that yield, share their load as they can, not as commanded.
+  const bool tipping = AboutToTip(desired) || yielding_legs_.any();
   if (tipping) {
     learn_from_ = tick.time + feedback_pause_;
     if (last_index_ >= 0) feedback_.Release(tick.time - last_time_);

@@ -12,8 +12,8 @@ using robot::kFeet;
 
 constexpr double kLoadShare = 0.6;     // of the command, below which a leg yields; chosen
 constexpr double kLightLoad = 0.1;     // of the weight: what a foot bears of so little is no sign
-constexpr double kFullLoad = 0.3;      // of the weight: who is to bear it and does is on the ground
-constexpr double kBounceTime = 10e-3;  // s over which a load is averaged: bounces are shorter
+constexpr double kFullLoad = 0.3;      // of the weight, asked of a foot: one that bears it is down
+constexpr double kBounceTime = 10e-3;  // s, of the low-pass on a load: bounces are shorter
 constexpr double kDeviations = 2;      // of the reading, which may show less than the foot bears
 constexpr double kYieldTime = 5e-3;    // s, rotor's inertia over damping
 
@@ -51,14 +51,19 @@ void YieldingLegs::Yield(const FootArray<bool>& in_contact, const robot_state_t&
     has_borne_[f] = has_borne_[f] && in_contact[f];
     if (in_contact[f]) borne[f] = BorneShare(f, measured, *command);
   }
+  any_ = false;
   for (const Joint& joint : joints_) {
-    double share = -1;
-    for (const Foot f : kFeet) {
-      if (in_contact[f] && joint.carries[f]) share = std::max(share, borne[f]);
-    }
-    if (share < 0 || share == 1) continue;
-    double& torque = command->torque[joint.index];
-    torque = share * torque - (1 - share) * joint.damping * measured.joint_velocity[joint.index];
+    const auto share_by = [&](Foot f) { return joint.carries[f] && in_contact[f] ? borne[f] : 0; };
+    const bool stands = (joint.carries[Foot::kRight] && in_contact[Foot::kRight]) ||
+                        (joint.carries[Foot::kLeft] && in_contact[Foot::kLeft]);
+    const double share = std::max(share_by(Foot::kRight), share_by(Foot::kLeft));
+    if (!stands || share == 1) continue;
+    any_ = true;
+    const size_t j = joint.index;
+    command->torque[j] =
+        share * command->torque[j] - (1 - share) * joint.damping * measured.joint_velocity[j];
+    command->stiffness[j] *= share;
+    command->damping[j] *= share;
   }
 }
 

@@ -1,7 +1,6 @@
 // What becomes of a leg's torque where the ground does not bear its foot.
 #pragma once
 
-#include <span>
 #include <vector>
 
 #include "components/framework/state_archive.h"
@@ -13,26 +12,29 @@ namespace poise {
 
 /// (53) takes each foot in contact for fixed to the ground. One that a push lifts, kicks away or
 /// leaves without load has nothing to press against, and its torque throws the leg instead. So it
-/// is given in proportion to what the foot surely lacks,
+/// is given in proportion to the most that the foot may bear,
 ///   τ = s τ_(53) − (1 − s) d q̇,  s = (F + 2 σ) / (0.6 (F_c − m g / 10)), 0 ≤ s ≤ 1,
-/// with F and F_c, N, the measured force on the sole, averaged over 10 ms, and the commanded one, σ
-/// the reading's standard deviation, and d, N·m·s/rad, the inertia of the joint's rotor over 5 ms,
-/// as the bridge damps. A foot that bears more than 0.6 of its load, or is to bear next to none,
-/// changes nothing. Nor does one that has not yet borne what it was asked for, 0.3 of the weight at
-/// least, since it landed: it may be a millimetre above the ground, which its torque has to find. A
-/// leg that yields still loads its foot: it gets more of its torque than the foot bears of its
-/// load.
+/// with F and F_c, N, the measured force on the sole, low-passed over 10 ms, and the commanded one,
+/// σ a reading's standard deviation, and d, N·m·s/rad, the inertia of the joint's rotor over 5 ms.
+/// Stiffness and damping that a drive closes get the share s, too.
+/// A foot that bears more than 0.6 of its load, or is to bear next to none, changes nothing. Nor
+/// does one that has not borne so much since it landed, when asked for 0.3 of the weight or more:
+/// it may be a millimetre above the ground, which its torque has to find. A leg that yields still
+/// loads its foot: it gets more of its torque than the foot bears of its load.
 class YieldingLegs {
  public:
   YieldingLegs() = default;  ///< none
   /// `period`, s, of a tick.
   YieldingLegs(const robot::RobotModel& model, double period);
 
-  /// Once a tick. Changes `command`'s torque; its foot_wrench is what is commanded. A joint that
+  /// Once a tick. Changes `command`'s torque, stiffness and damping; its foot_wrench is what is
+  /// commanded. A joint that
   /// carries both feet yields with the one that bears more of its load.
   void Yield(const robot::FootArray<bool>& in_contact, const robot_state_t& measured,
              joint_command_t* command);
-  void Archive(StateArchive* archive) { archive->Show(load_, has_borne_); }
+  /// Whether a leg yielded in the last tick.
+  bool any() const { return any_; }
+  void Archive(StateArchive* archive) { archive->Show(load_, has_borne_, any_); }
 
  private:
   struct Joint {
@@ -47,8 +49,9 @@ class YieldingLegs {
   std::vector<Joint> joints_;              // of the legs
   double load_gain_ = 0;                   // of load_, per tick
   double light_load_ = 0, full_load_ = 0;  // N
-  robot::FootArray<double> load_;          // N, measured, averaged
-  robot::FootArray<bool> has_borne_;       // 0.3 of the weight, since it is in contact
+  robot::FootArray<double> load_;          // N, measured, low-passed
+  bool any_ = false;
+  robot::FootArray<bool> has_borne_;  // 0.3 of the weight, since it is in contact
 };
 
 }  // namespace poise

@@ -76,7 +76,7 @@ class TaskController : public Component, public Operated {
   std::array<TaskList::ForcedJoint, TaskList::kMostForced> forced_;
   size_t num_forced_ = 0;
   std::vector<robot::FootArray<bool>> carries_;  // by joint
-  Eigen::VectorXd acceleration_;             // n×1
+  Eigen::VectorXd acceleration_;                 // n×1
   Eigen::VectorXd posture_acceleration_, posture_torque_;
   Eigen::VectorXd torque_, free_torque_;
 };

@@ -1,7 +1,6 @@
 // Planner, task controller, monitor and redistributor together, for the redistributor's tests.
 #pragma once
 
-#include <algorithm>
 #include <string>
 
 #include "components/contact_wrench_monitor/contact_wrench_monitor.h"
@@ -39,8 +38,6 @@ class Chain {
     return RunMessage(tick);
   }
   const joint_command_t& RunMessage(int64_t tick) {
-    // The ground bears whatever the feet are asked for: no leg yields.
-    for (wrench_t& wrench : state_.foot_wrench) wrench.force[2] = std::min(wrench.force[2], -1e5);
     planner_.Run(TickAt(tick));
     task_.Run(TickAt(tick));
     monitor_.Run(TickAt(tick));

@@ -390,6 +390,29 @@ TEST(Redistributor, HoldsTheLastCommandWhenItsNeighboursHaveNone) {
   EXPECT_EQ(chain.Run(standing, 3).status, joint_command_t::STATUS_OK);
 }
 
+TEST(Redistributor, ALegYieldsWhoseFootLosesItsLoad) {
+  Chain chain(TestRobot::kDyros, "phase { }", MonitorConfig(true), RedistributorText());
+  const robot::RobotState standing = StandingState(chain.model());
+  chain.Run(standing, 0);
+  const auto run = [&](double left, int64_t from) {
+    for (int64_t tick = from; tick < from + 50; ++tick) {
+      chain.state().foot_wrench[0].force[2] = chain.state().foot_wrench[1].force[2] = -300;
+      chain.state().foot_wrench[1].force[2] = -left;
+      chain.RunMessage(tick);
+    }
+    return chain.RunMessage(from + 50);
+  };
+  const joint_command_t borne = run(300, 1), lost = run(0, 60);
+  const auto joint = [&](const char* name) {
+    return static_cast<size_t>(chain.model().FindJoint(name));
+  };
+  EXPECT_NE(borne.torque[joint("left_knee_pitch")], 0);
+  EXPECT_NEAR(lost.torque[joint("left_knee_pitch")], 0, 0.01) << "at rest nothing is damped";
+  EXPECT_EQ(lost.torque[joint("right_knee_pitch")], borne.torque[joint("right_knee_pitch")]);
+  EXPECT_EQ(lost.foot_wrench[1].force[2], borne.foot_wrench[1].force[2]);
+  EXPECT_EQ(lost.redistribution_torque, borne.redistribution_torque);
+}
+
 // The COM above the right foot would leave the left one the 2 % of eta_max.
 TEST(Redistributor, ALandedFootKeepsItsShareUntilItLeavesTheGround) {
   Chain chain(TestRobot::kDyros, "phase { }", MonitorConfig(false), RedistributorText());

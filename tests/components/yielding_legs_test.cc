@@ -1,5 +1,4 @@
-// What a leg is given whose foot the ground does not bear: closed forms of its definition, and the
-// power that such a leg can take.
+// What a leg is given whose foot the ground does not bear: closed forms of its definition.
 #include "components/redistributor/yielding_legs.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +17,7 @@ using robot::TestRobot;
 
 constexpr robot::FootArray<bool> kBoth(true);
 constexpr double kTickPeriod = 2e-3;  // s
-constexpr double kAsked = 250;    // N on each foot
+constexpr double kAsked = 250;        // N on each foot
 
 class YieldingLegsTest : public testing::Test {
  protected:
@@ -91,7 +90,6 @@ TEST_F(YieldingLegsTest, AFootWithoutLoadDampsItsLegAlone) {
     const double expected =
         right[j] ? -Damping(j) * measured_.joint_velocity[j] : command_.torque[j];
     EXPECT_NEAR(torque[j], expected, 1e-6) << j;
-    if (right[j]) EXPECT_LE(torque[j] * measured_.joint_velocity[j], 0) << "it takes power";
   }
 }
 

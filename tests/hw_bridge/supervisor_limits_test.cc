@@ -155,7 +155,9 @@ TEST(SupervisorLimits, NoTorqueMakesAJointFasterThanAnyControlledMotion) {
     bench.Run(20, torque, 0);
     bench.Run(15, torque, speed);  // the filter of the velocity has settled
     EXPECT_EQ(bench.status().state, Status::STATE_RUNNING) << speed;
-    return bench.status().applied_torque[1];
+    const double given = bench.status().applied_torque[1];
+    EXPECT_EQ(bench.status().saturated[1], given == torque ? 0 : Status::LIMIT_VELOCITY);
+    return given;
   };
   for (const double way : {-1.0, 1.0}) {
     EXPECT_EQ(applied(way * 20, way * 1.9), way * 20);
