@@ -69,7 +69,7 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   }
 
   impedance_ = PlannedImpedance(config.impedance(), *model_, context.tick_period);
-  yielding_legs_ = YieldingLegs(*model_, context.tick_period);
+  if (config.yielding_legs()) yielding_legs_ = YieldingLegs(*model_, context.tick_period);
   swing_friction_ = SwingFriction(config.friction_compensation(), *model_, context.tick_period);
   whole_body_ = context.shared->Get<balance::WholeBody>(
       "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });

@@ -25,7 +25,7 @@
 namespace poise {
 
 /// ROBOT_STATE, SUPPORT_PLAN, BALANCE_TORQUE -> JOINT_COMMAND. In single support the torque passes
-/// through. Of either a leg yields whose foot the ground does not bear (YieldingLegs). With
+/// through. With
 /// STATUS_INVALID_INPUT (the balance torque is held or not finite) the last good command is sent
 /// again; when there is a fresh torque but no resultant, that torque passes through undistributed,
 /// with the same status. The hardware bridge refuses either as stale: it holds its last accepted

@@ -391,7 +391,8 @@ TEST(Redistributor, HoldsTheLastCommandWhenItsNeighboursHaveNone) {
 }
 
 TEST(Redistributor, ALegYieldsWhoseFootLosesItsLoad) {
-  Chain chain(TestRobot::kDyros, "phase { }", MonitorConfig(true), RedistributorText());
+  Chain chain(TestRobot::kDyros, "phase { }", MonitorConfig(true),
+              RedistributorText() + " yielding_legs: true");
   const robot::RobotState standing = StandingState(chain.model());
   chain.Run(standing, 0);
   const auto run = [&](double left, int64_t from) {
