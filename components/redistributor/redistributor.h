@@ -25,11 +25,10 @@
 namespace poise {
 
 /// ROBOT_STATE, SUPPORT_PLAN, BALANCE_TORQUE -> JOINT_COMMAND. In single support the torque passes
-/// through. With
-/// STATUS_INVALID_INPUT (the balance torque is held or not finite) the last good command is sent
-/// again; when there is a fresh torque but no resultant, that torque passes through undistributed,
-/// with the same status. The hardware bridge refuses either as stale: it holds its last accepted
-/// command for a few cycles, then damps the joints, then stops.
+/// through. With STATUS_INVALID_INPUT (the balance torque is held or not finite) the last good
+/// command is sent again; when there is a fresh torque but no resultant, that torque
+/// passes through undistributed, with the same status. The hardware bridge refuses either as stale:
+/// it holds its last accepted command for a few cycles, then damps the joints, then stops.
 class Redistributor : public Component, public Operated {
  public:
   void Configure(const ComponentContext& context, Wiring* wiring) override;

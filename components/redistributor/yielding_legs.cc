@@ -44,7 +44,7 @@ double YieldingLegs::BorneShare(Foot foot, const robot_state_t& measured,
 
 void YieldingLegs::Yield(const FootArray<bool>& in_contact, const robot_state_t& measured,
                          joint_command_t* command) {
-  FootArray<double> borne(0.0);
+  FootArray<double> borne(1.0);  // a swinging foot asks for no load
   for (const Foot f : kFeet) {
     const double load = -measured.foot_wrench[Index(f)].force[2];
     if (std::isfinite(load)) load_[f] += load_gain_ * (load - load_[f]);
@@ -53,11 +53,11 @@ void YieldingLegs::Yield(const FootArray<bool>& in_contact, const robot_state_t&
   }
   any_ = false;
   for (const Joint& joint : joints_) {
-    const auto share_by = [&](Foot f) { return joint.carries[f] && in_contact[f] ? borne[f] : 0; };
-    const bool stands = (joint.carries[Foot::kRight] && in_contact[Foot::kRight]) ||
-                        (joint.carries[Foot::kLeft] && in_contact[Foot::kLeft]);
-    const double share = std::max(share_by(Foot::kRight), share_by(Foot::kLeft));
-    if (!stands || share == 1) continue;
+    double share = 0;
+    for (const Foot f : kFeet) {
+      if (joint.carries[f]) share = std::max(share, borne[f]);
+    }
+    if (share == 1) continue;
     any_ = true;
     const size_t j = joint.index;
     command->torque[j] =

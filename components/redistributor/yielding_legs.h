@@ -28,8 +28,7 @@ class YieldingLegs {
   YieldingLegs(const robot::RobotModel& model, double period);
 
   /// Once a tick. Changes `command`'s torque, stiffness and damping; its foot_wrench is what is
-  /// commanded. A joint that
-  /// carries both feet yields with the one that bears more of its load.
+  /// commanded. A joint that carries both feet yields with the one that bears more of its load.
   void Yield(const robot::FootArray<bool>& in_contact, const robot_state_t& measured,
              joint_command_t* command);
   /// Whether a leg yielded in the last tick.
@@ -51,7 +50,7 @@ class YieldingLegs {
   double light_load_ = 0, full_load_ = 0;  // N
   robot::FootArray<double> load_;          // N, measured, low-passed
   bool any_ = false;
-  robot::FootArray<bool> has_borne_;  // 0.3 of the weight, since it is in contact
+  robot::FootArray<bool> has_borne_;  // enough of its load, since it is in contact
 };
 
 }  // namespace poise

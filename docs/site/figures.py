@@ -473,32 +473,23 @@ def _(task, i, _, cells):
     task.put(i, "figure", *((made.seconds,), (GIVEN, made.seconds), (made.seconds, made.processor))[min(i, 2)])
 
 
+STEP_ROWS = {"steps, N·s": "impulse", "no step, N·s": "impulse", "of m ω r": "share_of_lip", "of m ω (r + l": "share_of_step",
+             "largest survived": "largest_survived_impulse", "T, s": "step_time", "l, m": "reach"}
+
+
 @reads("steps", "From both feet")
 @reads("steps", "On the right foot")
 def _(task):
-    step_limits(task, "--set step_planner.recovery.enabled=false --set step_planner.hip_strategy.enabled=true")
-
-
-STEP_ROWS = {"steps, N·s": "impulse", "steps: N·s": "impulse", "no step, N·s": "impulse", "no step: of m ω r": "share_of_lip",
-             "of m ω r": "share_of_lip", "of m ω (r + l": "share_of_step", "largest survived": "largest_survived_impulse",
-             "T, s": "step_time", "l, m": "reach"}
-
-
-def step_limits(task, no_step):
-    """A row is a column of limits.csv, 16 directions across; a row that names no robot and engine goes on with those above."""
-    group, without_step = "", False
+    """A row is a column of limits.csv, 16 directions across; a row that names no engine goes on with those above."""
+    group, no_step = "", "--set step_planner.recovery.enabled=false --set step_planner.hip_strategy.enabled=true"
 
     def row(i, first, _):
-        nonlocal group, without_step
-        if re.match(r"MuJoCo|ODE|heron|G1", first):
-            group, without_step = first, "no step" in first
+        nonlocal group
+        if re.match(r"MuJoCo|ODE", first):
+            group = first
         label = next((v for k, v in STEP_ROWS.items() if k in first), None)
-        told = task.told("poise limit")
-        if "right foot" in group:
-            told = told.replace("_double", "_single")
-        if group.startswith("G1"):
-            told = told.replace("heron/heron", "g1/g1")
-        limits = task.command(told, no_step if without_step else "", W="ode" if "ODE" in group else "mujoco").table("limits.csv")
+        changes = no_step if "no step" in group else ""
+        limits = task.command(task.told("poise limit"), changes, W="ode" if "ODE" in group else "mujoco").table("limits.csv")
         for place, limit in enumerate(limits, 1):
             if limit[label] != "":
                 task.put(i, place, limit[label])

@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <limits>
 #include <random>
+#include <vector>
 
 #include "tests/components/control_fixture.h"
 #include "tests/test_seed.h"
