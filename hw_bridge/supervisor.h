@@ -120,6 +120,11 @@ class Supervisor {
   /// The torque within all limits; adds to `limits` those that have changed it.
   double Limit(size_t joint, double wanted, int8_t* limits) const;
   double FadePosition(size_t joint, double torque) const;
+  double FadeVelocity(size_t joint, double torque) const;
+  /// rad/s that no controlled motion has.
+  double TripSpeed(size_t joint) const {
+    return config_.settings.velocity_trip() * config_.velocity_limit[joint];
+  }
   void FillStatus(int64_t cycle, bridge_status_t* status) const;
 
   SupervisorConfig config_;
@@ -127,6 +132,7 @@ class Supervisor {
   FeedbackMonitor monitor_;
   TiltFilter tilt_;
   std::vector<ThermalBudget> thermal_;
+  double speed_gain_;  // of mean_speed_, per cycle
   int stop_ramp_cycles_, first_ramp_cycles_, resume_cycles_;
   int hold_cycles_;                      // between the last command's end and damping
   std::vector<double> torque_;           // N·m, last accepted command
@@ -137,6 +143,7 @@ class Supervisor {
   std::vector<int64_t> hold_counts_;     // where joints are held
   std::vector<double> resume_from_;      // N·m, applied before the command was back
   std::vector<char> faulted_, enabled_;  // enabled_: as reported
+  std::vector<double> mean_speed_;       // rad/s, without sign, over kSpeedTime
   std::vector<int8_t> drive_state_;
   int8_t state_ = bridge_status_t::STATE_INIT;
   int8_t reason_ = bridge_status_t::REASON_NO_COMMAND;

@@ -120,11 +120,51 @@ TEST(SupervisorTrips, TooFast) {
   config.velocity_limit = {9, 2, 9};
   config.settings.set_velocity_trip(1.5);
   Bench bench(config);
-  bench.Run(50, 0, 2.9);
+  bench.Run(500, 0, 2.9);
   EXPECT_EQ(bench.status().state, Status::STATE_RUNNING);
-  bench.Run(50, 0, 3.1);
+  bench.Run(500, 0, 3.1);
   EXPECT_EQ(bench.status().reason, Status::REASON_JOINT_VELOCITY);
   EXPECT_EQ(bench.status().reason_joint, 1);
+}
+
+// A joint that goes at v > v_trip from rest has a mean speed of v (1 − exp(−t / T)).
+TEST(SupervisorTrips, ABlowIsOverBeforeItsMeanSpeedIsTooFast) {
+  SupervisorConfig config = ThreeJoints();
+  config.velocity_limit = {9, 2, 9};
+  config.settings.set_velocity_trip(1.5);
+  for (const double speed : {3.5, 6.0, 9.0}) {
+    const double trips_after = 0.1 * std::log(speed / (speed - 3));
+    const auto run = [&](double time) {
+      Bench bench(config);
+      bench.Run(50, 0, 0);
+      bench.Run(static_cast<int>(std::lround(time / config.period)), 0, speed);
+      bench.Run(50, 0, 0);
+      return bench.status().state;
+    };
+    EXPECT_EQ(run(trips_after - 0.008), Status::STATE_RUNNING) << speed;
+    EXPECT_NE(run(trips_after + 0.012), Status::STATE_RUNNING) << speed;
+  }
+}
+
+TEST(SupervisorLimits, NoTorqueMakesAJointFasterThanAnyControlledMotion) {
+  SupervisorConfig config = ThreeJoints();
+  config.velocity_limit = {9, 2, 9};
+  config.settings.set_velocity_trip(1.5);
+  const auto applied = [&](double torque, double speed) {
+    Bench bench(config);
+    bench.Run(20, torque, 0);
+    bench.Run(15, torque, speed);  // the filter of the velocity has settled
+    EXPECT_EQ(bench.status().state, Status::STATE_RUNNING) << speed;
+    const double given = bench.status().applied_torque[1];
+    EXPECT_EQ(bench.status().saturated[1], given == torque ? 0 : Status::LIMIT_VELOCITY);
+    return given;
+  };
+  for (const double way : {-1.0, 1.0}) {
+    EXPECT_EQ(applied(way * 20, way * 1.9), way * 20);
+    EXPECT_NEAR(applied(way * 20, way * 2.5), way * 10, 0.1);
+    EXPECT_EQ(applied(way * 20, way * 3.2), 0);
+    EXPECT_EQ(applied(-way * 20, way * 3.2), -way * 20) << "it brakes";
+  }
 }
 
 /// The readings of a body that tips about y at `rate` for `cycles`, then stays.

@@ -343,6 +343,7 @@ TEST(Supervisor, AnEncoderThatJumpsStops) {
     const bool stops = std::abs(share) > 1;
     EXPECT_EQ(bench.status().state, stops ? Status::STATE_STOPPING : Status::STATE_RUNNING);
     EXPECT_EQ(bench.status().reason, stops ? Status::REASON_ENCODER_JUMP : Status::REASON_NONE);
+    EXPECT_TRUE(std::isfinite(bench.drives().current[0]));
     EXPECT_EQ(bench.status().reason_joint, stops ? 0 : -1);
     if (stops) {
       EXPECT_EQ(bench.drives().current[0], 0);

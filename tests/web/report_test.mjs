@@ -556,13 +556,13 @@ test('a run that grows grows in the plots, the bar and the picture', async () =>
 });
 
 test('a second run says how it ended, and is told apart from the first', async () => {
-  const fell = poise('run', 'push_double_support', '--inline', '--duration', '2', '--without', 'balancing', '--set', 'sim.push[0].peak=300', '--out', path('fell'));
+  const fell = poise('run', 'push_double_support', '--inline', '--duration', '2', '--without', 'balancing', '--set', 'sim.push[0].peak=350', '--out', path('fell'));
   assert.equal(fell.status, 1, fell.stderr);
   poise('report', path('a'), path('fell'), '-o', path('fell.html'));
   const {page, problems} = await openPage(browser, path('fell.html'), {picture: false});
   const [first, second] = await page.locator('.run-head').allInnerTexts();
   const time = /fell at ([\d.]+) s/.exec(second)[1];
-  for (const text of ['second run', 'without balancing', 'sim.push[0].peak=300', 'fell', `the robot fell at ${time} s`, 'FAILED']) assert.ok(second.includes(text), text);
+  for (const text of ['second run', 'without balancing', 'sim.push[0].peak=350', 'fell', `the robot fell at ${time} s`, 'FAILED']) assert.ok(second.includes(text), text);
   assert.match(first, /first run[^]*robot dyros_legs, a, [^]*stood on both feet/);
   assert.doesNotMatch(first, /fell/);
   // Its events are a list of their own, and marks of their own on the bar.
@@ -576,9 +576,9 @@ test('a second run says how it ended, and is told apart from the first', async (
   await page.locator('.run-head.second .time-link', {hasText: `${time} s`}).first().click();
   near((await state(page)).time, Number(time), 1e-6);
   assert.match(await lists.nth(1).locator('[aria-current]').first().innerText(), new RegExp(`${time} s`));
-  await page.evaluate(() => window.poise.player.seek(0.6));
+  await page.evaluate(() => window.poise.player.seek(1.25));
   const bridge = page.locator('.readout tr', {hasText: 'bridge'}).locator('td div');
-  assert.deepEqual(await bridge.allInnerTexts(), ['running', 'stopped']);
+  assert.deepEqual(await bridge.allInnerTexts(), ['running', 'stopping']);
   // Curves, desired ones and limits each have a line of their own.
   const panel = page.locator('.panel', {hasText: 'COM motion, lateral'}).first();
   await panel.scrollIntoViewIfNeeded();
