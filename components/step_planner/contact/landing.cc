@@ -10,6 +10,9 @@ namespace {
 constexpr double kVelocityTime = 0.05;
 // Standard deviations of an observed load that are a touch, and below which it is none.
 constexpr double kTouchDeviations = 3, kReleaseDeviations = 1.2;
+// Share of observed_load that is contact of a foot that searches. It is slow, so that its load is
+// known better, and what the foot's task presses with need not come to all of it.
+constexpr double kSearchedShare = 1.0 / 3;
 // Share of the press' load that counts as pressed: a sole that lies down rocks between loads.
 constexpr double kPressed = 0.8;
 // m that a foot rises which found no surface: clear of what it may have touched with its edge.
@@ -17,12 +20,12 @@ constexpr double kRetractHeight = 0.05;
 
 }  // namespace
 
-LoadLevels::LoadLevels(const LandingSpec& spec, double deviation)
+LoadLevels::LoadLevels(const LandingSpec& spec, double deviation, bool searches)
     : touch(std::max(spec.touch_load, kTouchDeviations * deviation)),
       release(std::max(spec.release_load, kReleaseDeviations * deviation)),
       press(spec.press_load) {
   if (deviation <= 0) return;
-  touch = std::max(touch, spec.observed_load);
+  touch = std::max(touch, (searches ? kSearchedShare : 1) * spec.observed_load);
   press = std::max(press, 2 * touch);
 }
 
@@ -70,7 +73,7 @@ void Landing::Measure(double time, double load, double deviation) {
   period_ = TickPeriod(time - time_);
   time_ = time;
   load_ = load;
-  levels_ = LoadLevels(spec_, deviation);
+  levels_ = LoadLevels(spec_, deviation, state_ == State::kSearching);
   const bool before = touch_.touching();
   if (touch_.Update(time, load, levels_) && !before) touched_ = time;
   if (spec_.presses && load < kPressed * spec_.press_load) touched_ = time;

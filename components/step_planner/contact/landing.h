@@ -17,7 +17,8 @@ struct LandingSpec {
   double touch_load = 0;     ///< N on the sole that are contact
   double release_load = 0;   ///< N below which it is lost again
   double press_load = 0;     ///< N at which the search comes to a stand, and of a press
-  double observed_load = 0;  ///< N that an observed load must be above at least to be contact
+  /// N that an observed load must be above at least to be contact; a third of it in a search.
+  double observed_load = 0;
   double touch_duration = kTouchTime;  ///< s that a load must last, or its loss
   /// s from the touch until the foot counts as a contact. The default is three times relax_time's:
   /// what the lowering presses with is given back first, so that the model's change makes no step
@@ -41,7 +42,8 @@ struct LoadLevels {
   double press = 0;    ///< at which a search comes to a stand
 
   /// `deviation`: N, of an observed load; 0 of a measured one, whose noise the loads allow for.
-  LoadLevels(const LandingSpec& spec, double deviation);
+  /// `searches`: the foot goes on downward past where the ground was expected.
+  LoadLevels(const LandingSpec& spec, double deviation, bool searches = false);
 };
 
 /// Contact from a measured load, with hysteresis: it is made when the load has stayed above

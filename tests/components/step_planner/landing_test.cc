@@ -386,5 +386,25 @@ TEST(Landing, AnObservedLoadMustBeMoreThanItsNoise) {
   }
 }
 
+// A foot that stands on the ground and was never told to have landed carries what its task presses
+// with: a tenth of the weight. It waited for 0.15 of it while the robot fell.
+TEST(Landing, AThirdOfAnObservedLoadIsContactOfAFootThatSearches) {
+  LandingSpec spec = Shipped();
+  spec.observed_load = 60;  // N
+  for (const bool past_its_time : {false, true}) {
+    for (const double load : {15.0, 25.0, 65.0}) {
+      Landing landing(spec);
+      PointMotion reference;
+      Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+      landing.BeginSwing(0, 0);
+      for (int tick = 0; tick < 100; ++tick) {
+        landing.Measure(kTick * tick, tick < 10 ? 0 : load, 2);
+        landing.Update(true, past_its_time, Eigen::Isometry3d::Identity(), &reference, &rotation);
+      }
+      EXPECT_EQ(landing.state() == State::kTouching, load > (past_its_time ? 20 : 60)) << load;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace poise
