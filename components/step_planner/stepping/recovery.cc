@@ -142,8 +142,10 @@ void Recovery::Catch(const StepInput& input, const StepState& state) {
     // The foot that the capture point is nearer to stays.
     const double left = std::cos(state.yaw) * way.y() - std::sin(state.yaw) * way.x();
     StepReason reason = StepReason::kWalk;
-    const StepPlan plan =
+    StepPlan plan =
         WalkOn(state, left > 0 ? Foot::kRight : Foot::kLeft, choice_.limits().unload, &reason);
+    // Beyond that foot's far edge only it can catch the capture point, once the other one stands.
+    if (reason == StepReason::kAgain) plan = choice_.Choose(state);
     BeginStep(input, plan, reason);
   } else if (stays_outside_ && steps_now_ < kMostSteps) {
     BeginStep(input, choice_.Choose(state), StepReason::kAgain);
