@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <condition_variable>
 #include <cstdio>
 
 #include "fmt/format.h"
@@ -33,17 +34,9 @@ void StatusLine::Clear() {
 }
 
 StageLine::StageLine(bool quiet)
-    : line_(quiet), made_(std::chrono::steady_clock::now()), thread_([this] { Run(); }) {}
-
-StageLine::~StageLine() {
-  End();
-  {
-    const std::lock_guard lock(mutex_);
-    over_ = true;
-  }
-  changed_.notify_all();
-  thread_.join();
-}
+    : line_(quiet),
+      made_(std::chrono::steady_clock::now()),
+      thread_([this](const std::stop_token& stop) { Run(stop); }) {}
 
 void StageLine::Begin(const std::string& stage) {
   const std::lock_guard lock(mutex_);
@@ -57,10 +50,11 @@ void StageLine::End() {
   line_.Clear();
 }
 
-void StageLine::Run() {
+void StageLine::Run(const std::stop_token& stop) {
   using Seconds = std::chrono::duration<double>;
+  std::condition_variable_any asked;
   std::unique_lock lock(mutex_);
-  while (!changed_.wait_for(lock, kStageInterval, [this] { return over_; })) {
+  while (!asked.wait_for(lock, stop, kStageInterval, [&] { return stop.stop_requested(); })) {
     const auto now = std::chrono::steady_clock::now();
     const double wall = Seconds(now - made_).count(), stage = Seconds(now - begin_).count();
     if (stage_.empty() || stage < kQuietStage || !line_.Due(wall)) continue;

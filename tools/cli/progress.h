@@ -2,7 +2,6 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -32,7 +31,7 @@ class StatusLine {
 class StageLine {
  public:
   explicit StageLine(bool quiet);
-  ~StageLine();
+  ~StageLine() { End(); }
   StageLine(const StageLine&) = delete;
   StageLine& operator=(const StageLine&) = delete;
 
@@ -42,16 +41,14 @@ class StageLine {
   void End();
 
  private:
-  void Run();
+  void Run(const std::stop_token& stop);
 
   std::mutex mutex_;
-  std::condition_variable changed_;
   StatusLine line_;
   std::string stage_;  // empty: none
   std::chrono::steady_clock::time_point begin_;
   std::chrono::steady_clock::time_point made_;
-  bool over_ = false;
-  std::thread thread_;
+  std::jthread thread_;
 };
 
 /// A run's progress.

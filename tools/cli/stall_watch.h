@@ -2,10 +2,8 @@
 #pragma once
 
 #include <algorithm>
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
-#include <mutex>
 #include <thread>
 
 #include "tools/cli/child_process.h"
@@ -43,23 +41,11 @@ class StallWatch {
   int64_t stood_ = 0;      // ns
 };
 
-/// Asks a StallWatch in a thread of its own, for what blocks this one.
-class StallThread {
- public:
-  /// `progress`: any number that changes while it goes on; negative: what may last. `stalled`: is
-  /// called with it, in that thread, once it has not changed for `patience`, ns.
-  StallThread(int64_t patience, std::function<int64_t()> progress,
-              std::function<void(int64_t)> stalled);
-  ~StallThread();
-  StallThread(const StallThread&) = delete;
-  StallThread& operator=(const StallThread&) = delete;
-
- private:
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool over_ = false;
-  std::thread thread_;
-};
+/// Asks a StallWatch in a thread of its own, for what blocks this one, until that is joined.
+/// `progress`: any number that changes while it goes on; negative: what may last. `stalled`: is
+/// called with it, in that thread, once it has not changed for `patience`, ns.
+std::jthread WatchForStall(int64_t patience, std::function<int64_t()> progress,
+                           std::function<void(int64_t)> stalled);
 
 /// Measures for how long a process has said nothing though it could have. It is asked again and
 /// again: of the time between two questions neither what the process waited for a processor counts,

@@ -57,23 +57,16 @@ std::string StatusText(const std::string& run_id, nlohmann::ordered_json status)
 }
 
 RunStatus::RunStatus(std::string log, Scenario scenario)
-    : log_(std::move(log)), scenario_(std::move(scenario)), thread_([this] { Run(); }) {}
-
-RunStatus::~RunStatus() {
-  {
-    const std::lock_guard lock(mutex_);
-    stopped_ = true;
-  }
-  stop_.notify_one();
-  thread_.join();
-}
+    : log_(std::move(log)),
+      scenario_(std::move(scenario)),
+      thread_([this](const std::stop_token& stop) { Run(stop); }) {}
 
 void RunStatus::Finish() {
   {
     const std::lock_guard lock(mutex_);
     ended_ = true;
   }
-  stop_.notify_one();
+  finished_.notify_one();
 }
 
 std::optional<nlohmann::ordered_json> RunStatus::Take() {
@@ -81,7 +74,7 @@ std::optional<nlohmann::ordered_json> RunStatus::Take() {
   return std::exchange(newest_, std::nullopt);
 }
 
-void RunStatus::Run() {
+void RunStatus::Run(const std::stop_token& stop) {
   bool ended = false;
   while (true) {
     const auto start = Clock::now();
@@ -105,8 +98,8 @@ void RunStatus::Run() {
     if (ended) return;
     const auto pause = std::max<Clock::duration>(kPause, kShare * (Clock::now() - start));
     std::unique_lock lock(mutex_);
-    stop_.wait_for(lock, pause, [this] { return stopped_ || ended_; });
-    if (stopped_) return;
+    finished_.wait_for(lock, stop, pause, [this] { return ended_; });
+    if (stop.stop_requested()) return;
     ended = ended_;
   }
 }

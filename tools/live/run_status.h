@@ -25,9 +25,8 @@ std::string StatusText(const std::string& run_id, nlohmann::ordered_json status)
 /// log that has become too large is left as it was read last.
 class RunStatus {
  public:
+  /// Its end waits for a reading under way.
   RunStatus(std::string log, Scenario scenario);
-  /// Waits for a reading under way.
-  ~RunStatus();
 
   /// The run has ended: the log is read once more, for its final status.
   void Finish();
@@ -35,16 +34,15 @@ class RunStatus {
   std::optional<nlohmann::ordered_json> Take();
 
  private:
-  void Run();
+  void Run(const std::stop_token& stop);
 
   const std::string log_;
   const Scenario scenario_;
   std::mutex mutex_;
-  std::condition_variable stop_;
-  bool stopped_ = false;
+  std::condition_variable_any finished_;
   bool ended_ = false;
   std::optional<nlohmann::ordered_json> newest_;
-  std::thread thread_;
+  std::jthread thread_;
 };
 
 }  // namespace poise

@@ -9,6 +9,7 @@
 
 #include "components/framework/run.h"
 #include "fmt/format.h"
+#include "tools/cli/stall_watch.h"
 
 namespace poise {
 namespace {
@@ -34,7 +35,7 @@ StageWatch::StageWatch(const RunSpec& spec, std::vector<InlineRunner::StageName>
     End(at / stages, static_cast<int32_t>(at % stages), "hangs",
         fmt::format("has not returned for {} s", kStallPatience / 1'000'000'000));
   };
-  thread_.emplace(kStallPatience, progress, stalled);
+  thread_ = WatchForStall(kStallPatience, progress, stalled);
 }
 
 StageWatch::~StageWatch() { present = nullptr; }

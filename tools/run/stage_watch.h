@@ -3,14 +3,13 @@
 
 #include <cstdint>
 #include <functional>
-#include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "components/framework/graph.pb.h"
 #include "components/framework/runners/inline_runner.h"
 #include "components/framework/runners/run_position.h"
-#include "tools/cli/stall_watch.h"
 
 namespace poise {
 
@@ -39,7 +38,7 @@ class StageWatch {
   const std::vector<InlineRunner::StageName> stages_;
   const std::function<std::string()> last_words_;
   RunPosition position_;
-  std::optional<StallThread> thread_;
+  std::jthread thread_;
 };
 
 }  // namespace poise

@@ -14,6 +14,7 @@
 #include <map>
 #include <optional>
 #include <random>
+#include <thread>
 #include <utility>
 
 #include "components/framework/build_info.h"
@@ -344,7 +345,7 @@ BoundGraph ConfigureRun(const LoadedScenario& loaded, RunSpec* spec) {
   CheckSharedProcesses(spec->graph());
   try {
     std::atomic<int> configuring{-1};  // component of the graph; -1: none
-    const StallThread watch(
+    const std::jthread watch = WatchForStall(
         kReadyPatience, [&] { return configuring.load(); },
         [&](int64_t component) {
           EndHanging(spec->graph().component(static_cast<int>(component)));
