@@ -10,9 +10,9 @@
 #include "components/framework/modules.h"
 #include "fmt/format.h"
 #include "tools/charts/sweep_charts.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/output_style.h"
-#include "tools/cli/shell_word.h"
 #include "tools/report/html_report.h"
 #include "tools/scenario/library_versions.h"
 

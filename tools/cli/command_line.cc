@@ -1,8 +1,12 @@
 #include "tools/cli/command_line.h"
 
 #include <algorithm>
+#include <charconv>
+#include <cstdint>
+#include <cstdlib>
 #include <memory>
 #include <set>
+#include <system_error>
 #include <vector>
 
 #include "components/framework/configuration/suggest.h"
@@ -139,6 +143,26 @@ void SetExample(CLI::App* command, const std::string& example) {
 CLI::Option* AddList(CLI::App* command, const char* flag, std::vector<std::string>* to,
                      const char* text, const char* type) {
   return command->add_option(flag, *to, text)->type_name(type)->allow_extra_args(false)->take_all();
+}
+
+std::function<std::string(const std::string&)> Within(const char* range, bool (*good)(double)) {
+  return [=](const std::string& text) -> std::string {
+    char* end = nullptr;
+    const double value = std::strtod(text.c_str(), &end);
+    const bool number = !text.empty() && *end == '\0';
+    return number && good(value) ? "" : fmt::format("{}: must be {}", text, range);
+  };
+}
+
+std::function<std::string(const std::string&)> Whole() {
+  return [](const std::string& text) -> std::string {
+    uint64_t value = 0;
+    const char* const end = text.data() + text.size();
+    const auto [stop, error] = std::from_chars(text.data(), end, value);
+    if (error == std::errc() && stop == end) return "";
+    return fmt::format("{}: must be a whole number, 0 or more{}", text,
+                       error == std::errc::result_out_of_range ? ", below 2^64" : "");
+  };
 }
 
 std::string HelpText(const CLI::App& app) {

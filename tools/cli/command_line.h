@@ -1,7 +1,8 @@
-// What a person reads of a command line: its help, and what is wrong with it.
+// What CLI11 needs beside it: help, checks of what a command line says, and what is wrong with it.
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -19,6 +20,13 @@ void SetExample(CLI::App* command, const std::string& example);
 /// it.
 CLI::Option* AddList(CLI::App* command, const char* flag, std::vector<std::string>* to,
                      const char* text, const char* type = "TEXT");
+
+/// "TEXT: must be RANGE" for what is no number or not `good`; NaN never is. For CLI::Option::check.
+std::function<std::string(const std::string&)> Within(const char* range, bool (*good)(double));
+
+/// "TEXT: must be a whole number ..." for what is none from 0 to 2^64 - 1. For CLI::Option::check,
+/// since the parser alone takes -1 and more digits for the largest.
+std::function<std::string(const std::string&)> Whole();
 
 /// The help of the command that was asked about, in the terminal's width.
 std::string HelpText(const CLI::App& app);

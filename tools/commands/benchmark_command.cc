@@ -11,7 +11,6 @@
 #include "tools/cli/command_line.h"
 #include "tools/cli/lists.h"
 #include "tools/cli/output_place.h"
-#include "tools/cli/shell_word.h"
 #include "tools/cli/temporary_dir.h"
 #include "tools/commands/commands.h"
 #include "tools/report/html_report.h"

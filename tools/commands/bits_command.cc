@@ -9,7 +9,7 @@
 #include "fmt/format.h"
 #include "logging/log_reader.h"
 #include "logging/replay/bits.h"
-#include "tools/cli/cli_checks.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/lists.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/signals.h"

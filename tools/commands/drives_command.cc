@@ -9,7 +9,6 @@
 #include "hw_bridge/ethercat/emulator/emulated_chain.h"
 #include "hw_bridge/ethercat/emulator/rotor.h"
 #include "hw_bridge/ethercat/links/socket_link.h"
-#include "tools/cli/cli_checks.h"
 #include "tools/cli/command_line.h"
 #include "tools/cli/lists.h"
 #include "tools/cli/output_place.h"

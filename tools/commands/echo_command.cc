@@ -13,7 +13,6 @@
 #include "fmt/format.h"
 #include "logging/log_messages.h"
 #include "poise/health_t.hpp"
-#include "tools/cli/cli_checks.h"
 #include "tools/cli/command_line.h"
 #include "tools/cli/lists.h"
 #include "tools/cli/signals.h"

@@ -10,7 +10,6 @@
 #include "logging/printable.h"
 #include "logging/replay/log_pack.h"
 #include "logging/run_info.h"
-#include "tools/cli/cli_checks.h"
 #include "tools/cli/command_line.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/output_style.h"

@@ -16,7 +16,6 @@
 #include "tools/cli/output_place.h"
 #include "tools/cli/output_style.h"
 #include "tools/cli/progress.h"
-#include "tools/cli/shell_word.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
 #include "tools/report/html_report.h"

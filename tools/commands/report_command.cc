@@ -2,7 +2,6 @@
 
 #include "fmt/format.h"
 #include "logging/printable.h"
-#include "tools/cli/cli_checks.h"
 #include "tools/cli/command_line.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/progress.h"

@@ -2,11 +2,10 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
-#include "tools/cli/cli_checks.h"
 #include "tools/cli/command_line.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/output_style.h"
-#include "tools/cli/shell_word.h"
 #include "tools/cli/text_table.h"
 #include "tools/commands/commands.h"
 #include "tools/robot_import/robot_import.h"

@@ -5,7 +5,6 @@
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_rules.h"
 #include "fmt/format.h"
-#include "tools/cli/cli_checks.h"
 #include "tools/cli/command_line.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"

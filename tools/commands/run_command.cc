@@ -1,7 +1,6 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
-#include "tools/cli/cli_checks.h"
 #include "tools/cli/command_line.h"
 #include "tools/commands/commands.h"
 #include "tools/live/interactive_run.h"

@@ -10,7 +10,7 @@
 #include "fmt/chrono.h"
 #include "fmt/format.h"
 #include "logging/printable.h"
-#include "tools/cli/cli_checks.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/output_place.h"
 #include "tools/commands/commands.h"
 #include "tools/run/live_run.h"

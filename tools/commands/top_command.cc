@@ -7,7 +7,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
-#include "tools/cli/cli_checks.h"
+#include "tools/cli/command_line.h"
 #include "tools/cli/signals.h"
 #include "tools/cli/terminal.h"
 #include "tools/commands/commands.h"

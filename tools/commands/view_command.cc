@@ -7,7 +7,6 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
-#include "tools/cli/cli_checks.h"
 #include "tools/cli/command_line.h"
 #include "tools/cli/output_style.h"
 #include "tools/cli/signals.h"

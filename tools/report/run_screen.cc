@@ -11,7 +11,7 @@
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "logging/printable.h"
-#include "tools/cli/shell_word.h"
+#include "tools/cli/lists.h"
 #include "tools/cli/text_table.h"
 #include "tools/report/event_list.h"
 #include "tools/report/run_story.h"

@@ -12,7 +12,6 @@
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "logging/printable.h"
-#include "tools/cli/cli_checks.h"
 #include "tools/cli/command_line.h"
 #include "tools/cli/lists.h"
 #include "tools/cli/output_place.h"
