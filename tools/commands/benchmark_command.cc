@@ -117,7 +117,6 @@ int RunBenchmark(const BenchmarkArguments& arguments) {
     const bool limit = parts[i].sweep().has_limit();
     SessionOptions options = arguments.session;
     options.out = PartFolder(folder, parts[i]).string();
-    options.resume = arguments.session.resume;
     SweepSession session(definitions[i], limit ? kKindLimit : kKindSweep, options);
     const std::vector<int64_t> points =
         BenchmarkPoints(parts[i], definitions[i].points().size(), arguments.quick);
