@@ -3,11 +3,22 @@
 #pragma once
 
 #include "components/robot/robot_model.h"
-#include "sim/drive_impedance.h"
 #include "sim/sim.pb.h"
 #include "sim/world.h"
 
 namespace poise {
+
+/// What a drive adds to its torque by itself: stiffness (N·m/rad) and damping (N·m·s/rad) at the
+/// joint, about a position (rad) that is held and a velocity (rad/s).
+struct DriveImpedance {
+  double stiffness = 0, damping = 0, position = 0, velocity = 0;
+
+  bool active() const { return stiffness != 0 || damping != 0; }
+  /// N·m at the motor's position and velocity.
+  double Torque(double motor_position, double motor_velocity) const {
+    return stiffness * (position - motor_position) + damping * (velocity - motor_velocity);
+  }
+};
 
 /// One joint's share of a step, made into a single JointRow: with a rigid gear the joint torque
 ///   lambda = -I (qd' - qd)/h - c qd' - sigma z' - stop,

@@ -92,10 +92,6 @@ std::string_view SimComponent::finished() const {
   return simulation_ ? simulation_->end_reason() : std::string_view{};
 }
 
-bool SimComponent::LosesCommand() {
-  return command_loss_ > 0 && losses_->Uniform() < command_loss_;
-}
-
 void SimComponent::TakeActs(const Tick& tick) {
   using operate::answer_t;
   for (size_t body = 0; body < push_until_.size(); ++body) {
@@ -125,7 +121,7 @@ void SimComponent::TakeActs(const Tick& tick) {
 void SimComponent::Step(const Tick& tick) {
   TakeActs(tick);
   if (tick.index > 0) {
-    if (LosesCommand()) {
+    if (command_loss_ > 0 && losses_->Uniform() < command_loss_) {
       // The drives hold what they have.
     } else if (drive_command_.present()) {
       simulation_->SetCurrents(drive_command_->current, drive_command_->enabled);

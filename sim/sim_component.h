@@ -57,8 +57,6 @@ class SimComponent : public Component, public Operated {
  private:
   void TakeActs(const Tick& tick);
   void Step(const Tick& tick);
-  /// Whether this tick's command does not reach the drives.
-  bool LosesCommand();
   void PublishFeedback();
   void PublishPush();
   void PublishTruth();

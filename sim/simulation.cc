@@ -226,12 +226,8 @@ void Simulation::SetCurrents(std::span<const double> current, std::span<const in
     const auto i = static_cast<Eigen::Index>(j);
     enabled_[j] = j < current.size() && j < enabled.size() && enabled[j] != 0 ? 1 : 0;
     impedance_[j] = {};
-    double amperes = enabled_[j] != 0 ? current[j] : 0;
-    if (!std::isfinite(amperes)) {
-      ++refused_currents_;
-      amperes = 0;
-    }
-    amperes = current_loop_.Quantise(amperes);
+    const bool follows = enabled_[j] != 0 && std::isfinite(current[j]);
+    double amperes = current_loop_.Quantise(follows ? current[j] : 0);
     if (torque_limits_) {
       const double limit = CurrentLimit(j);
       amperes = std::clamp(amperes, -limit, limit);
@@ -246,7 +242,6 @@ void Simulation::SetImpedance(std::span<const DriveImpedance> impedance) {
     if (enabled_[j] == 0 || !drive.active()) continue;
     if (!(drive.stiffness >= 0 && drive.damping >= 0) ||
         !std::isfinite(drive.stiffness + drive.damping + drive.position + drive.velocity)) {
-      ++refused_currents_;
       continue;
     }
     impedance_[j] = drive;

@@ -66,11 +66,11 @@ class Simulation {
 
   /// Motor currents (A) to follow from now on, rounded to the drives' resolution and limited to the
   /// peak current and the joint's effort if the configuration says so; `enabled` 0: motor free. A
-  /// current that is not finite counts as 0 A and is counted.
+  /// current that is not finite counts as 0 A.
   void SetCurrents(std::span<const double> current, std::span<const int8_t> enabled);
   /// Stiffness and damping that the enabled drives add from now on, by joint, after SetCurrents;
   /// none: nothing. The same limits hold for the sum. One that is not finite, or negative, counts
-  /// as nothing and is counted with the refused currents.
+  /// as nothing.
   void SetImpedance(std::span<const DriveImpedance> impedance);
   /// Once a tick: whether the bridge follows commands, which lets the crane go.
   void Follow(bool follows) {
@@ -103,7 +103,6 @@ class Simulation {
   /// Why fallen or broken, e.g. "the robot fell at 1.234 s (body tilt 0.83 rad)", or that the crane
   /// holds the robot at time 0; empty otherwise.
   std::string_view end_reason() const { return end_reason_; }
-  int64_t refused_currents() const { return refused_currents_; }
 
  private:
   void StepOnce();
@@ -160,7 +159,6 @@ class Simulation {
   size_t oldest_ = 0;
   double start_com_height_ = 0;
   bool fallen_ = false, broken_ = false;
-  int64_t refused_currents_ = 0;
   char end_reason_[200] = "";
 };
 
