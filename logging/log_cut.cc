@@ -91,11 +91,8 @@ CutResult CutLog(const std::string& from, const CutRange& range, const std::stri
   LogEvent event;
   while (reader.Next(&event)) {
     if (event.channel == kRunInfoChannel || !IsKept(spec, std::string(event.channel))) continue;
-    const MessageType* type =
-        event.data.size() < 8 ? nullptr : FindMessageType(ReadInt64(event.data.data()));
-    if (type == nullptr || !type->has_header ||
-        type->well_formed_size(event.data.data(), static_cast<int64_t>(event.data.size())) !=
-            static_cast<int64_t>(event.data.size())) {
+    const MessageType* const type = WholeMessageType(event);
+    if (type == nullptr) {
       result.refused += in_time(event.utime) ? 1 : 0;
       continue;
     }

@@ -20,15 +20,9 @@ LogMessages::LogMessages(const std::string& path, Run run) : reader_(path) {
 }
 
 const MessageType* LogMessages::TypeOf(const LogEvent& event) const {
-  if (event.data.size() < 8) return nullptr;
-  const int64_t fingerprint = ReadInt64(event.data.data());
+  const MessageType* const type = WholeMessageType(event);
   const auto known = graph_.find(event.channel);
-  const MessageType* const type =
-      known == graph_.end() ? FindMessageType(fingerprint) : known->second;
-  const auto size = static_cast<int64_t>(event.data.size());
-  const bool good = type != nullptr && type->has_header && type->fingerprint == fingerprint &&
-                    type->well_formed_size(event.data.data(), size) == size;
-  return good ? type : nullptr;
+  return known == graph_.end() || known->second == type ? type : nullptr;
 }
 
 std::string LogMessages::Label(std::string_view channel, std::string_view path) const {

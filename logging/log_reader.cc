@@ -77,6 +77,18 @@ bool SwallowsRecord(const uint8_t* record, size_t size, const uint8_t* end) {
 
 }  // namespace
 
+const MessageType* TypeByFingerprint(const LogEvent& event) {
+  return event.data.size() < 8 ? nullptr : FindMessageType(ReadInt64(event.data.data()));
+}
+
+const MessageType* WholeMessageType(const LogEvent& event) {
+  const MessageType* const type = TypeByFingerprint(event);
+  const auto size = static_cast<int64_t>(event.data.size());
+  const bool whole = type != nullptr && type->has_header &&
+                     type->well_formed_size(event.data.data(), size) == size;
+  return whole ? type : nullptr;
+}
+
 bool IsEventLog(const std::string& path) {
   std::array<char, sizeof(kMagicBytes)> begin{};
   std::ifstream in(path, std::ios::binary);

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "lcmtypes/message_fields.h"
 #include "logging/paged_file.h"
 #include "logging/run_log_writer.h"
 
@@ -20,6 +21,11 @@ struct LogEvent {
   std::span<const uint8_t> data;
   uint64_t offset = 0;  ///< of the record in the file, bytes
 };
+
+/// The type whose fingerprint the event's data begin with; nullptr: they begin with none's.
+const MessageType* TypeByFingerprint(const LogEvent& event);
+/// TypeByFingerprint, where the data are one message of it, with a header and whole; else nullptr.
+const MessageType* WholeMessageType(const LogEvent& event);
 
 /// A place where the file held no record.
 struct LogDamage {

@@ -100,8 +100,7 @@ class Surveyor {
     ChannelSurvey& other = others_[std::string(event.channel)];
     other.ticks.name = event.channel;
     other.bytes += static_cast<int64_t>(event.data.size());
-    const MessageType* type =
-        event.data.size() < 8 ? nullptr : FindMessageType(ReadInt64(event.data.data()));
+    const MessageType* const type = TypeByFingerprint(event);
     if (type == nullptr || !type->has_header || !AllFinite(*type, event.data)) {
       ++other.ticks.refused;
       other.refused_at.push_back(event.offset);

@@ -23,13 +23,8 @@ std::set<int64_t> RunIds(LogReader* reader) {
   std::set<int64_t> ids;
   LogEvent event;
   for (int i = 0; i < kLooks && reader->Next(&event); ++i) {
-    const MessageType* type =
-        event.data.size() < 8 ? nullptr : FindMessageType(ReadInt64(event.data.data()));
-    const auto size = static_cast<int64_t>(event.data.size());
-    if (type == nullptr || !type->has_header || event.channel == kRunInfoChannel ||
-        type->well_formed_size(event.data.data(), size) != size) {
-      continue;
-    }
+    const MessageType* const type = WholeMessageType(event);
+    if (type == nullptr || event.channel == kRunInfoChannel) continue;
     ids.insert(ReadInt64(event.data.data() + type->run_id_offset));
   }
   reader->Rewind();

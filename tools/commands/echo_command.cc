@@ -196,8 +196,7 @@ int EchoLog(const EchoOptions& options) {
     if (names.find(event.channel) == names.end()) names.emplace(event.channel);
     if (event.channel != options.channel) continue;
     // The fingerprint tells the type, in logs of other recorders too.
-    const MessageType* type =
-        event.data.size() < 8 ? nullptr : FindMessageType(ReadInt64(event.data.data()));
+    const MessageType* const type = logging::TypeByFingerprint(event);
     if (type == nullptr) {
       output.AddUnreadable();
     } else {
