@@ -1,7 +1,7 @@
 #include "python/message_layout.h"
 
 #include <algorithm>
-#include <bit>
+#include <boost/endian/conversion.hpp>
 #include <cstring>
 #include <map>
 #include <utility>
@@ -17,36 +17,18 @@ const std::map<std::string_view, Number>& Numbers() {
   return numbers;
 }
 
-template <class Word>
-Word Swapped(Word word) {
-  if constexpr (std::endian::native == std::endian::big) return word;
-  if constexpr (sizeof(Word) == 2) return static_cast<Word>(__builtin_bswap16(word));
-  if constexpr (sizeof(Word) == 4) return __builtin_bswap32(word);
-  if constexpr (sizeof(Word) == 8) return __builtin_bswap64(word);
-  return word;
-}
-
-template <class Word>
-void ReadWords(const Leaf& leaf, const uint8_t* message, void* to) {
-  auto* out = static_cast<uint8_t*>(to);
-  for (const size_t at : leaf.elements) {
-    Word word;
-    std::memcpy(&word, message + at, sizeof(word));
-    word = Swapped(word);
-    std::memcpy(out, &word, sizeof(word));
-    out += sizeof(word);
-  }
-}
-
-template <class Word>
-void WriteWords(const Leaf& leaf, const void* from, uint8_t* message) {
-  const auto* in = static_cast<const uint8_t*>(from);
-  for (const size_t at : leaf.elements) {
-    Word word;
-    std::memcpy(&word, in, sizeof(word));
-    word = Swapped(word);
-    std::memcpy(message + at, &word, sizeof(word));
-    in += sizeof(word);
+/// Calls `visit` with an unsigned number of the size of the leaf's.
+template <class Visit>
+void WithWord(const Leaf& leaf, const Visit& visit) {
+  switch (SizeOf(leaf.number)) {
+    case 1:
+      return visit(uint8_t{});
+    case 2:
+      return visit(uint16_t{});
+    case 4:
+      return visit(uint32_t{});
+    default:
+      return visit(uint64_t{});
   }
 }
 
@@ -154,29 +136,27 @@ const Leaf* MessageLayout::Find(std::string_view path) const {
 }
 
 void MessageLayout::Read(const Leaf& leaf, const uint8_t* message, void* to) {
-  switch (SizeOf(leaf.number)) {
-    case 1:
-      return ReadWords<uint8_t>(leaf, message, to);
-    case 2:
-      return ReadWords<uint16_t>(leaf, message, to);
-    case 4:
-      return ReadWords<uint32_t>(leaf, message, to);
-    default:
-      return ReadWords<uint64_t>(leaf, message, to);
-  }
+  auto* out = static_cast<uint8_t*>(to);
+  WithWord(leaf, [&](auto word) {
+    for (const size_t at : leaf.elements) {
+      std::memcpy(&word, message + at, sizeof(word));
+      word = boost::endian::big_to_native(word);
+      std::memcpy(out, &word, sizeof(word));
+      out += sizeof(word);
+    }
+  });
 }
 
 void MessageLayout::Write(const Leaf& leaf, const void* from, uint8_t* message) {
-  switch (SizeOf(leaf.number)) {
-    case 1:
-      return WriteWords<uint8_t>(leaf, from, message);
-    case 2:
-      return WriteWords<uint16_t>(leaf, from, message);
-    case 4:
-      return WriteWords<uint32_t>(leaf, from, message);
-    default:
-      return WriteWords<uint64_t>(leaf, from, message);
-  }
+  const auto* in = static_cast<const uint8_t*>(from);
+  WithWord(leaf, [&](auto word) {
+    for (const size_t at : leaf.elements) {
+      std::memcpy(&word, in, sizeof(word));
+      word = boost::endian::native_to_big(word);
+      std::memcpy(message + at, &word, sizeof(word));
+      in += sizeof(word);
+    }
+  });
 }
 
 }  // namespace poise::python

@@ -12,6 +12,7 @@
 #include "fmt/format.h"
 #include "logging/events/bridge_words.h"
 #include "poise/bridge_status_t.hpp"
+#include "tools/cli/lists.h"
 #include "tools/scenario/described_components.h"
 #include "tools/scenario/registry.h"
 #include "tools/scenario/run_setup.h"
@@ -102,17 +103,13 @@ void Session::Replace(const SessionOptions& options, ComponentRegistry* registry
     }
   }
   for (const auto& [name, type] : Components().entries()) registry->Add(type);
-  std::string names;
-  for (const ComponentInstance& instance : graph.component()) {
-    names += (names.empty() ? "" : ", ") + instance.name();
-  }
   for (const auto& [name, functions] : replaced) {
     const auto same = [&, of = &name](const auto& instance) { return instance.name() == *of; };
     auto* const all = graph.mutable_component();
     const auto found = std::find_if(all->begin(), all->end(), same);
     if (found == all->end()) {
-      throw ConfigError(
-          fmt::format("graph {}: has no component '{}'; it has {}", graph.name(), name, names));
+      throw ConfigError(fmt::format("graph {}: has no component '{}'; it has {}", graph.name(),
+                                    name, Joined(NamesOf(graph.component()), ", ")));
     }
     const ComponentType* const former = registry->TypeNamed(TypeOf(*found));
     if (former == nullptr) {

@@ -1,7 +1,6 @@
 """Components written in Python."""
 
 import collections
-import json
 import os
 import sys
 
@@ -115,12 +114,6 @@ class Component:
         self.step(Tick(*tick), incoming, outputs)
 
 
-def _ports(component):
-    inputs = [(port, of, "same tick") if isinstance(of, str) else (port, *of) for port, of in component.inputs.items()]
-    outputs = [(port, of, "same tick") for port, of in component.outputs.items()]
-    return inputs, outputs
-
-
 def main(component, name=None, arguments=None):
     """main() of a program that is one component of a run's graph: `sys.exit(poise.main(MyController))`.
 
@@ -130,17 +123,10 @@ def main(component, name=None, arguments=None):
     """
     arguments = list(sys.argv if arguments is None else arguments)
     name = name or os.path.splitext(os.path.basename(arguments[0]))[0]
-    inputs, outputs = _ports(component)
+    inputs = [(port, of, "same tick") if isinstance(of, str) else (port, *of) for port, of in component.inputs.items()]
+    outputs = [(port, of, "same tick") for port, of in component.outputs.items()]
     if not inputs and not outputs:
         raise _poise.ConfigError(f"{component.__name__} declares neither inputs nor outputs")
     summary = (component.__doc__ or "").strip().split("\n")[0]
     sys.stdout.flush()
     return _poise.component_main(arguments, name, summary, inputs, outputs, component)
-
-
-def description(component, name):
-    """What `NAME --describe` prints, as text."""
-    inputs, outputs = _ports(component)
-    return json.dumps({"name": name, "summary": (component.__doc__ or "").strip().split("\n")[0],
-                       "inputs": [{"name": p, "type": t, "kind": k} for p, t, k in inputs],
-                       "outputs": [{"name": p, "type": t} for p, t, _ in outputs]}, indent=2)

@@ -72,13 +72,13 @@ class Environment:
     """
 
     def __init__(self, scenario, changes=None, *, robot=None, engine=None, variant=None, seed=None, ideal=False, without=(),
-                 duration=None, components=None, plant=None, record=False, out=None, force=False):
+                 duration=None, components=None, plant=None, record=False, out=None, force=False, _endless=None):
         self._arguments = dict(
             scenario=os.fspath(scenario),
             changes=_changes(changes, robot=robot, engine=engine, variant=variant, seed=seed, ideal=ideal, without=without,
                              duration=duration),
             components=dict(components or {}), plant=plant._store if plant is not None else None, record=record,
-            out=os.fspath(out) if out else "", force=force, endless=duration is None)
+            out=os.fspath(out) if out else "", force=force, endless=duration is None if _endless is None else _endless)
         self.reset()
 
     def reset(self, seed=None, changes=None):
@@ -226,17 +226,7 @@ def run(scenario, changes=None, *, duration=None, out=None, force=False, **other
     it the run is kept in memory, some 3 MB a second and robot of 12 joints. Others: as for Environment. Raises poise.Error;
     a robot that falls is no error: see Run.checks.
     """
-    env = Environment.__new__(Environment)
-    components = dict(others.pop("components", None) or {})
-    plant = others.pop("plant", None)
-    known = {"robot", "engine", "variant", "seed", "ideal", "without"}
-    if not known.issuperset(others):
-        raise TypeError(f"run() takes no {', '.join(sorted(set(others) - known))}")
-    env._arguments = dict(
-        scenario=os.fspath(scenario), changes=_changes(changes, duration=duration, **others), components=components,
-        plant=plant._store if plant is not None else None, record=True, out=os.fspath(out) if out else "", force=force,
-        endless=False)
-    env.reset()
+    env = Environment(scenario, changes, duration=duration, record=True, out=out, force=force, _endless=False, **others)
     while env.step(1000) == 1000:
         pass
     return env.finish()

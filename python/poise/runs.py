@@ -199,9 +199,3 @@ class Run:
 def open(path=""):
     """The run in a folder, or a log; without one the latest run. Raises poise.Error."""
     return Run(_poise.RunStore.open(os.fspath(path)))
-
-
-def to_2d(array, count):
-    """An array of `count` numbers in its last axis as rows, and the axes before it."""
-    array = np.asarray(array, dtype=float)
-    return array.reshape(-1, count), array.shape[:-1]
