@@ -13,6 +13,7 @@
 #include <cerrno>
 #include <cmath>
 #include <csignal>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <limits>
@@ -79,28 +80,15 @@ MeshTriangles ReadHere(const fs::path& file, std::string* problem) {
   return mesh;
 }
 
-bool WriteAll(int pipe, const void* data, size_t size) {
-  const char* at = static_cast<const char*>(data);
-  while (size > 0) {
-    const ssize_t written = write(pipe, at, size);
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return false;
-    at += written;
-    size -= static_cast<size_t>(written);
-  }
-  return true;
+template <class Items>
+bool Send(const Items& items, FILE* pipe) {
+  return std::fwrite(items.data(), sizeof items[0], items.size(), pipe) == items.size();
 }
 
-bool ReadAll(int pipe, void* data, size_t size) {
-  char* at = static_cast<char*>(data);
-  while (size > 0) {
-    const ssize_t got = read(pipe, at, size);
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) return false;
-    at += got;
-    size -= static_cast<size_t>(got);
-  }
-  return true;
+template <class Items>
+bool Receive(size_t count, Items* items, FILE* pipe) {
+  items->resize(count);
+  return std::fread(items->data(), sizeof(*items)[0], count, pipe) == count;
 }
 
 /// What comes first through the pipe; the vertices, indices or the problem follow.
@@ -125,27 +113,24 @@ struct Header {
     problem = error.what();
   }
   const Header header{mesh.vertices.size(), mesh.indices.size(), problem.size()};
-  const bool sent =
-      WriteAll(pipe, &header, sizeof header) && WriteAll(pipe, problem.data(), problem.size()) &&
-      WriteAll(pipe, mesh.vertices.data(), mesh.vertices.size() * sizeof mesh.vertices[0]) &&
-      WriteAll(pipe, mesh.indices.data(), mesh.indices.size() * sizeof mesh.indices[0]);
+  FILE* const to = fdopen(pipe, "w");
+  const bool sent = to != nullptr && std::fwrite(&header, sizeof header, 1, to) == 1 &&
+                    Send(problem, to) && Send(mesh.vertices, to) && Send(mesh.indices, to) &&
+                    std::fflush(to) == 0;
   _exit(sent ? 0 : 1);  // nothing of the parent's is flushed or ended
 }
 
-bool Receive(int pipe, MeshTriangles* mesh, std::string* problem) {
+bool ReceiveMesh(FILE* pipe, MeshTriangles* mesh, std::string* problem) {
   Header header;
-  if (!ReadAll(pipe, &header, sizeof header)) return false;
+  if (std::fread(&header, sizeof header, 1, pipe) != 1) return false;
   if (header.vertices > kMostVertices || header.indices > 3 * kMostVertices ||
       header.problem > 10000) {
     *problem = "it is too large";
     return true;
   }
-  problem->resize(header.problem);
-  mesh->vertices.resize(header.vertices);
-  mesh->indices.resize(header.indices);
-  return ReadAll(pipe, problem->data(), problem->size()) &&
-         ReadAll(pipe, mesh->vertices.data(), mesh->vertices.size() * sizeof mesh->vertices[0]) &&
-         ReadAll(pipe, mesh->indices.data(), mesh->indices.size() * sizeof mesh->indices[0]);
+  return Receive(header.problem, problem, pipe) &&
+         Receive(header.vertices, &mesh->vertices, pipe) &&
+         Receive(header.indices, &mesh->indices, pipe);
 }
 
 }  // namespace
@@ -181,14 +166,14 @@ MeshTriangles LoadMesh(const fs::path& file, std::string* problem) {
     ReadInChild(file, pipe[1]);
   }
   close(pipe[1]);
-  bool received = false;
   if (child < 0) {
     *problem = std::strerror(errno);
-  } else {
-    received = Receive(pipe[0], &mesh, problem);
+    close(pipe[0]);
+    return mesh;
   }
-  close(pipe[0]);
-  if (child < 0) return mesh;
+  FILE* const from = fdopen(pipe[0], "r");
+  const bool received = from != nullptr && ReceiveMesh(from, &mesh, problem);
+  if (from != nullptr) std::fclose(from);
   int status = 0;
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) continue;
   if (!received) {
