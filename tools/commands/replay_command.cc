@@ -2,18 +2,23 @@
 #include <google/protobuf/text_format.h>
 
 #include <algorithm>
+#include <ctime>
 #include <filesystem>
+#include <map>
 #include <optional>
+#include <span>
 
+#include "components/framework/bus/udp_bus.h"
+#include "components/framework/clock.h"
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/suggest.h"
 #include "components/framework/configuration/text_pattern.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
+#include "logging/channel_ticks.h"
 #include "logging/log_messages.h"
 #include "logging/printable.h"
 #include "logging/replay/component_replay.h"
-#include "logging/replay/log_player.h"
 #include "tools/cli/command_line.h"
 #include "tools/cli/lists.h"
 #include "tools/cli/output_place.h"
@@ -200,23 +205,80 @@ int CompareReplay(const ReplayOptions& options, const std::string& log) {
   return equal && replayed ? kExitOk : kExitFailed;
 }
 
-int Play(const ReplayOptions& options, const std::string& log) {
-  std::string url = options.url;
-  if (url.empty()) {
-    const RunSpec spec = logging::LogMessages(log).spec();
-    url = spec.has_first_port() ? MirrorUrl(spec) : kDefaultUrl;  // the run had no network
+struct PlayedEvent {
+  int64_t tick;
+  std::string channel;
+  std::span<const uint8_t> data;
+};
+
+/// The messages of the graph's channels and of HEALTH_*, in the order of their ticks.
+std::vector<PlayedEvent> PlayedEvents(logging::LogMessages* messages) {
+  const RunSpec& spec = messages->spec();
+  std::map<std::string, logging::ChannelTicks, std::less<>> own_ticks;
+  for (const Channel& channel : spec.graph().channel()) {
+    if (!channel.external()) {
+      own_ticks.emplace(channel.name(),
+                        logging::ChannelTicks(spec, channel, messages->reader().file_size()));
+    }
   }
+  std::vector<PlayedEvent> events;
+  logging::LogEvent event;
+  int64_t newest = spec.cut().first_tick();
+  while (messages->reader().Next(&event)) {
+    const MessageType* const type = messages->TypeOf(event);
+    if (type == nullptr || event.channel == logging::kRunInfoChannel) continue;
+    const auto own = own_ticks.find(event.channel);
+    // What has no tick of its own keeps its place among the others.
+    std::optional<int64_t> tick = newest;
+    if (own != own_ticks.end()) tick = own->second.Check(event.data);
+    if (!tick) continue;
+    newest = std::max(newest, *tick);
+    events.push_back({*tick, std::string(event.channel), event.data});
+  }
+  std::stable_sort(events.begin(), events.end(),
+                   [](const PlayedEvent& a, const PlayedEvent& b) { return a.tick < b.tick; });
+  return events;
+}
+
+/// Waits until `due` (ns); false: stopped.
+bool WaitUntil(int64_t due) {
+  constexpr int64_t kLongestSleep = 50'000'000;  // ns, so that a stop is soon seen
+  for (int64_t now = NowNanoseconds(); now < due; now = NowNanoseconds()) {
+    if (StopSignal() != 0) return false;
+    const int64_t wake = std::min(due, now + kLongestSleep);
+    const timespec deadline{wake / 1'000'000'000, wake % 1'000'000'000};
+    clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr);
+  }
+  return StopSignal() == 0;
+}
+
+/// Sends the log's messages as the recorder mirrors them: those of tick t at t ticks' time / speed
+/// after the start.
+int Play(const ReplayOptions& options, const std::string& log) {
+  logging::LogMessages messages(log);
+  const RunSpec& spec = messages.spec();
+  std::string url = options.url;
+  if (url.empty()) url = spec.has_first_port() ? MirrorUrl(spec) : kDefaultUrl;  // no network
   fmt::print("playing {} at {}, {} x real time\n", log, url, options.speed);
   std::fflush(stdout);
   CatchStopSignals();
-  const logging::PlayResult result =
-      logging::PlayLog(log, url, options.speed, [] { return StopSignal() != 0; });
-  fmt::print("{} messages, {:.3f} s of the run{}\n", result.messages, result.time,
-             StopSignal() != 0 ? "; interrupted" : "");
-  if (result.failed > 0) {
-    fmt::print(stderr, "poise: {} messages could not be sent; see poise doctor\n", result.failed);
+  const std::vector<PlayedEvent> events = PlayedEvents(&messages);
+  BusSender bus(url);
+  int64_t sent = 0, failed = 0;
+  double played = 0;  // s of the run
+  const int64_t start = NowNanoseconds();
+  for (const PlayedEvent& event : events) {
+    const double time = static_cast<double>(event.tick - events.front().tick) * spec.tick_period();
+    if (!WaitUntil(start + static_cast<int64_t>(time / options.speed * 1e9))) break;
+    ++(bus.Send(event.channel.c_str(), event.data.data(), event.data.size()) ? sent : failed);
+    played = time;
   }
-  return result.failed > 0 || StopSignal() != 0 ? kExitFailed : kExitOk;
+  fmt::print("{} messages, {:.3f} s of the run{}\n", sent, played,
+             StopSignal() != 0 ? "; interrupted" : "");
+  if (failed > 0) {
+    fmt::print(stderr, "poise: {} messages could not be sent; see poise doctor\n", failed);
+  }
+  return failed > 0 || StopSignal() != 0 ? kExitFailed : kExitOk;
 }
 
 int Replay(const ReplayOptions& options) {
