@@ -17,16 +17,29 @@ using robot::kFeet;
 // Standard deviations at first: of the mass a share of the robot's, of its place m. A load of 15 %
 // anywhere, a COM off by 3 cm.
 constexpr double kStartMass = 0.15, kStartShift = 0.05;
+// The largest load that is believed: share of the robot's mass, and m times that mass of its moment
+// along each axis.
+constexpr double kMaxMass = 0.2, kMaxShift = 0.1;
+// Share of the robot's mass per √s, and m times it of the moment: how fast a load may change.
+constexpr double kWalk = 0.002;
+// N and N·m, per reading, of both feet's wrench less what the motion asks for.
+constexpr double kForceError = 2, kMomentError = 0.3;
+// rad/s of the body, and m/s² between its specific force and gravity, above which nothing is
+// learnt.
+constexpr double kStillRate = 0.3, kStillAcceleration = 0.5;
+// Squared normalised disagreement (chi-squared, 6 degrees of freedom) of a reading that is left
+// out.
+constexpr double kOutlierGate = 40;
+constexpr double kApplyTime = 0.2;  // s, time constant with which what is found is applied
 
 }  // namespace
 
-Calibrator::Calibrator(std::shared_ptr<const robot::RobotModel> model,
-                       const CalibrationConfig& config, double cutoff, double period)
+Calibrator::Calibrator(std::shared_ptr<const robot::RobotModel> model, bool enabled, double period)
     : model_(std::move(model)),
-      config_(config),
-      filter_(12, cutoff),
+      enabled_(enabled),
+      filter_(12, kObserverCutoff),
       input_(Eigen::VectorXd::Zero(12)),
-      correlated_(std::max(1.0, 1 / (2 * cutoff * period))) {
+      correlated_(std::max(1.0, 1 / (2 * kObserverCutoff * period))) {
   const double mass = model_->total_mass();
   covariance_.diagonal() << Square(kStartMass * mass),
       Vector3d::Constant(Square(kStartShift * mass));
@@ -43,17 +56,17 @@ void Calibrator::Track(const robot::FootArray<robot::Vector6d>& wrench, double d
   since_ += dt;
   const double mass = model_->total_mass();
   Load wanted = estimate_;
-  wanted[0] = std::clamp(wanted[0], -config_.max_mass() * mass, config_.max_mass() * mass);
-  const double reach = config_.max_shift() * mass;
+  wanted[0] = std::clamp(wanted[0], -kMaxMass * mass, kMaxMass * mass);
+  const double reach = kMaxShift * mass;
   for (int i = 1; i < 4; ++i) wanted[i] = std::clamp(wanted[i], -reach, reach);
-  applied_ += std::min(dt / config_.apply_time(), 1.0) * (wanted - applied_);
+  applied_ += std::min(dt / kApplyTime, 1.0) * (wanted - applied_);
 }
 
 void Calibrator::Update(const WrenchObserver& observer, bool usable) {
   const Vector3d& s = observer.specific_force();
   const Vector3d& w = observer.data().body_angular_velocity[0];
-  running_ = usable && w.norm() < config_.still_rate() &&
-             std::abs(s.norm() - robot::kGravity) < config_.still_acceleration();
+  running_ =
+      usable && w.norm() < kStillRate && std::abs(s.norm() - robot::kGravity) < kStillAcceleration;
   if (!running_) return;
   // Environment on robot, base axes, about the base's origin.
   robot::Vector6d ground = robot::Vector6d::Zero();
@@ -76,18 +89,18 @@ void Calibrator::Correct(const Eigen::Matrix<double, 6, 4>& regressor,
   const double mass = model_->total_mass();
   const double dt = std::max(since_, 0.0);
   since_ = 0;
-  covariance_.diagonal().head<3>().array() += Square(config_.walk() * mass) * dt;
+  covariance_.diagonal().head<3>().array() += Square(kWalk * mass) * dt;
   const robot::Vector6d gap = measured - regressor * estimate_;
   Eigen::Matrix<double, 6, 1> noise;
-  noise.head<3>().setConstant(correlated_ * Square(config_.force_error()));
-  noise.tail<3>().setConstant(correlated_ * Square(config_.moment_error()));
+  noise.head<3>().setConstant(correlated_ * Square(kForceError));
+  noise.tail<3>().setConstant(correlated_ * Square(kMomentError));
   const Eigen::Matrix<double, 4, 6> cross = covariance_ * regressor.transpose();
   Eigen::Matrix<double, 6, 6> total = regressor * cross;
   total.diagonal() += noise;
   const Eigen::LLT<Eigen::Matrix<double, 6, 6>> factors(total);
   const double difference = gap.dot(factors.solve(gap));
   // Something else pushes the robot, or a reading is wrong.
-  if (!(difference < config_.gate())) {
+  if (!(difference < kOutlierGate)) {
     running_ = false;
     return;
   }

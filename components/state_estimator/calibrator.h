@@ -13,7 +13,6 @@
 
 #include "components/framework/state_archive.h"
 #include "components/state_estimator/low_pass.h"
-#include "components/state_estimator/state_estimator.pb.h"
 #include "components/state_estimator/wrench_observer.h"
 
 namespace poise {
@@ -23,11 +22,10 @@ class Calibrator {
   /// (mass, kg; moment x, y, z, kg·m).
   using Load = Eigen::Vector4d;
 
-  /// `cutoff`: Hz, of the observer's low-pass, which readings and model pass alike. `period`: s.
-  Calibrator(std::shared_ptr<const robot::RobotModel> model, const CalibrationConfig& config,
-             double cutoff, double period);
+  /// `period`: s, of the ticks. The wrenches pass the observer's low-pass, as the model does.
+  Calibrator(std::shared_ptr<const robot::RobotModel> model, bool enabled, double period);
 
-  bool enabled() const { return config_.enabled(); }
+  bool enabled() const { return enabled_; }
   /// Each tick, `dt` s after the last: the soles' wrenches, robot on environment, sole frames.
   void Track(const robot::FootArray<robot::Vector6d>& wrench, double dt);
   /// Follows what the observer has found in this tick, to which no load was told. `usable`: both
@@ -46,7 +44,7 @@ class Calibrator {
   void Correct(const Eigen::Matrix<double, 6, 4>& regressor, const robot::Vector6d& measured);
 
   std::shared_ptr<const robot::RobotModel> model_;
-  CalibrationConfig config_;
+  bool enabled_;
   LowPass filter_;
   Eigen::VectorXd input_;
   double correlated_;  // samples that the filter makes one of

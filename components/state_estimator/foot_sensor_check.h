@@ -8,7 +8,7 @@
 
 #include "components/framework/state_archive.h"
 #include "components/state_estimator/low_pass.h"
-#include "components/state_estimator/state_estimator.pb.h"
+#include "components/state_estimator/wrench_observer.h"
 
 namespace poise {
 
@@ -18,9 +18,8 @@ class FootSensorCheck {
   using Covariance = Eigen::Matrix<double, 6, 6>;
   enum class State : int8_t { kOk, kAbsent, kInvalid, kDead, kFrozen, kBiased };
 
-  /// `cutoff`: Hz, of the observer's low-pass.
-  FootSensorCheck(const FootSensorCheckConfig& config, double cutoff)
-      : config_(config), filter_(6, cutoff) {}
+  /// `enabled`: false: the sensor is believed until it says itself that it is broken.
+  explicit FootSensorCheck(bool enabled) : enabled_(enabled) {}
 
   /// Once a tick, `dt` s after the last: what the sensor says of itself (kOk, kAbsent or kInvalid)
   /// and what it reads.
@@ -41,10 +40,10 @@ class FootSensorCheck {
   }
 
  private:
-  FootSensorCheckConfig config_;
+  bool enabled_;
   State state_ = State::kOk, said_ = State::kOk;
   Wrench measured_ = Wrench::Zero();
-  LowPass filter_;
+  LowPass filter_{6, kObserverCutoff};
   Eigen::VectorXd input_ = Wrench::Zero();  // of filter_
   bool reads_ = false;                      // the last tick had a reading
   // How far the reading went beyond its low-passed value to either side, fading.

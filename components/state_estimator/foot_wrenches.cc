@@ -11,17 +11,17 @@ using robot::kFeet;
 // Share of the weight by which sensor and observer must differ. A push that turns the joints'
 // friction over makes the observer wrong by up to an eighth of it (7.2); no loop is hurt by less.
 constexpr double kLeastShare = 0.15;
+// Ticks between two observations while all feet have good sensors, to compare them with.
+constexpr int kCheckEvery = 4;
 
 }  // namespace
 
 FootWrenches::FootWrenches(std::shared_ptr<const robot::RobotModel> model,
                            const StateEstimatorConfig& config)
-    : observer_(model, config.wrench_observer()),
-      check_every_(config.wrench_observer().check_every()),
-      push_gate_(config.wrench_observer().push_gate()),
+    : observer_(model),
       least_force_(kLeastShare * model->total_mass() * robot::kGravity),
-      check_{FootSensorCheck(config.foot_sensor_check(), config.wrench_observer().cutoff()),
-             FootSensorCheck(config.foot_sensor_check(), config.wrench_observer().cutoff())} {
+      check_{FootSensorCheck(config.foot_sensor_check().enabled()),
+             FootSensorCheck(config.foot_sensor_check().enabled())} {
   noise_.head<3>().setConstant(model->force_noise());
   noise_.tail<3>().setConstant(model->moment_noise());
   wrench_.fill(robot::Vector6d::Zero());
@@ -35,7 +35,7 @@ void FootWrenches::Update(int64_t tick, double dt, const BaseSensors& sensors,
   since_ += dt;
   for (const Foot f : kFeet) check_[f].Read(reading[f].state, reading[f].wrench, dt);
   const bool needed = !std::ranges::all_of(check_, &FootSensorCheck::good);
-  observed_ = (needed || (observer_.torque_known() && tick % check_every_ == 0)) &&
+  observed_ = (needed || (observer_.torque_known() && tick % kCheckEvery == 0)) &&
               observer_.Observe(correction, needed);
   if (observed_) {
     if (observer_.torque_known()) Compare();
@@ -56,7 +56,7 @@ void FootWrenches::Update(int64_t tick, double dt, const BaseSensors& sensors,
 
 void FootWrenches::Compare() {
   // While something pushes the robot, the observer has the legs alone to go by.
-  if (observer_.push_excess() > push_gate_) return;
+  if (observer_.pushed()) return;
   for (const Foot f : kFeet) {
     const auto at = 6 * static_cast<Eigen::Index>(f);
     check_[f].Compare(observer_.wrenches().segment<6>(at),

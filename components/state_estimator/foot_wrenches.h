@@ -7,6 +7,7 @@
 
 #include "components/framework/state_archive.h"
 #include "components/state_estimator/foot_sensor_check.h"
+#include "components/state_estimator/state_estimator.pb.h"
 #include "components/state_estimator/wrench_observer.h"
 
 namespace poise {
@@ -41,8 +42,7 @@ class FootWrenches {
   void Compare();
 
   WrenchObserver observer_;
-  int check_every_;
-  double push_gate_, least_force_;
+  double least_force_;
   robot::Vector6d noise_;
   robot::FootArray<FootSensorCheck> check_;
   robot::FootArray<robot::Vector6d> wrench_, deviation_;

@@ -26,6 +26,16 @@ constexpr double kGyroRange = 35, kGyroFault = 10;                     // rad/s
 constexpr double kAccelerometerRange = 160, kAccelerometerFault = 50;  // m/s²
 // An encoder of unknown resolution.
 constexpr double kUnknownEncoder = 1e-5;  // rad
+// Standard deviations of a good MEMS IMU, which the robot file's may exceed: noise per sample, and
+// biases at the start.
+constexpr double kLeastGyroNoise = 1e-4, kLeastGyroBias = 1e-3;                   // rad/s
+constexpr double kLeastAccelerometerNoise = 1e-2, kLeastAccelerometerBias = 0.1;  // m/s²
+// Random walk of its biases, an in-run instability over minutes: rad/s/√s, m/s²/√s.
+constexpr double kGyroBiasWalk = 1e-6, kAccelerometerBiasWalk = 1e-4;
+// s, by which encoders and IMU are not sampled at the same instant: a quarter of a 500 Hz cycle.
+constexpr double kTiming = 0.0005;
+// Share of 1/gear_stiffness, standard deviation of the gears' compliance at first: a data sheet's.
+constexpr double kComplianceError = 0.2;
 // Shares of the compliance that is assumed: no estimate is taken further.
 constexpr double kLeastCompliance = 0.1, kMostCompliance = 10;
 // s, over which innovations larger than their covariance are averaged.
@@ -37,6 +47,19 @@ constexpr double kLeastStance = 0.02;
 constexpr double kUnplacedTurn = 0.1, kUnplaced = 0.1;
 // The robot stands still at first, as far as feet and IMU can move against each other unseen.
 constexpr double kStartSpeed = 0.01;  // m/s
+// N·m by which the first torque readings may differ from what the gears carry, as after switching
+// drives on; until they have settled.
+constexpr double kStartTorque = 30;
+// rad/√s, walk of the rotation of a sole that stands, for the same reason as contact_walk.
+constexpr double kTurnWalk = 4e-5;
+// m/s and rad/s of a sole that slips or sinks, and of one that turns.
+constexpr double kSlipSpeed = 0.3, kTurnSpeed = 1;
+// Squared normalised innovation (chi-squared, 3 degrees of freedom) beyond which a sole moves: one
+// tick in 65,000.
+constexpr double kSlipGate = 25;
+// s in which a sole that slipped must have moved by less than so many m, turned by less than so
+// many rad, to stand again.
+constexpr double kRestTime = 0.05, kRestDistance = 1e-4, kRestTurn = 2e-4;
 // s, in which the ringing of a gear dies away: rotor and link of a tenth of a kg·m² on a harmonic
 // drive, damped by a twentieth of critical.
 constexpr double kRinging = 0.03;
@@ -50,7 +73,7 @@ constexpr double kTogether = 0.02;  // m/s
 constexpr double kLostTilt = 0.5, kLostSpeed = 10;  // rad, m/s, standard deviations
 constexpr double kRecoverTilt = 0.1, kRecoverSpeed = 1, kRecoverPosition = 1;
 
-/// What nobody gave is the robot's, and the IMU's noise is its own at least.
+/// What nobody gave is the robot's.
 InvariantEkfConfig WithRobot(InvariantEkfConfig config, const robot::RobotModel& model) {
   const robot::DriveTrainModel& drive = model.drive_train();
   if (!config.has_sensor_delay()) config.set_sensor_delay(drive.sensor_delay);
@@ -58,11 +81,6 @@ InvariantEkfConfig WithRobot(InvariantEkfConfig config, const robot::RobotModel&
     config.set_gear_stiffness(drive.link_encoder ? 0
                                                  : drive.gear_stiffness);  // the encoders see it
   }
-  const robot::ImuModel& imu = model.imu();
-  config.set_gyro_noise(std::max(config.gyro_noise(), imu.gyro_noise));
-  config.set_accelerometer_noise(std::max(config.accelerometer_noise(), imu.accelerometer_noise));
-  config.set_gyro_bias(std::max(config.gyro_bias(), imu.gyro_bias));
-  config.set_accelerometer_bias(std::max(config.accelerometer_bias(), imu.accelerometer_bias));
   return config;
 }
 
@@ -71,8 +89,9 @@ InvariantEkfConfig WithRobot(InvariantEkfConfig config, const robot::RobotModel&
 InvariantEstimator::InvariantEstimator(std::shared_ptr<const robot::RobotModel> model,
                                        const StateEstimatorConfig& config, double period)
     : model_(std::move(model)),
-      loads_(config),
       config_(WithRobot(config.invariant_ekf(), *model_)),
+      gyro_noise_(std::max(kLeastGyroNoise, model_->imu().gyro_noise)),
+      accelerometer_noise_(std::max(kLeastAccelerometerNoise, model_->imu().accelerometer_noise)),
       period_(period),
       weight_(model_->total_mass() * robot::kGravity),
       encoder_noise_(model_->num_joints()),
@@ -184,7 +203,7 @@ void InvariantEstimator::ReadSoles() {
       speed += velocity_filter_.value()[j] * shift;
       rate += velocity_filter_.value()[j] * turn;
     }
-    add_noise(Square(config_.timing()), speed, rate);
+    add_noise(Square(kTiming), speed, rate);
     reading.noise << linear, mixed.transpose(), mixed, angular;
     reading.compliance = filter_.state().compliance;
     reading.by_compliance << lag, lean;
@@ -197,16 +216,16 @@ void InvariantEstimator::Begin(const InvariantState& state, double turn, double 
   deviation.segment<3>(InvariantFilter::kRotation).setConstant(turn);
   deviation.segment<3>(InvariantFilter::kVelocity).setConstant(speed);
   deviation.segment<3>(InvariantFilter::kPosition).setConstant(position);
-  deviation.segment<3>(InvariantFilter::kGyroBias).setConstant(config_.gyro_bias());
+  deviation.segment<3>(InvariantFilter::kGyroBias)
+      .setConstant(std::max(kLeastGyroBias, model_->imu().gyro_bias));
   deviation.segment<3>(InvariantFilter::kAccelerometerBias)
-      .setConstant(config_.accelerometer_bias());
-  deviation[InvariantFilter::kCompliance] = config_.gear_stiffness_error();
+      .setConstant(std::max(kLeastAccelerometerBias, model_->imu().accelerometer_bias));
+  deviation[InvariantFilter::kCompliance] = kComplianceError;
   filter_.Set(state, deviation.cwiseAbs2().asDiagonal());
 }
 
 void InvariantEstimator::Place(const BaseSensors& sensors) {
-  const FootWeights weights =
-      WeighFeet(sensors.foot_load, weight_, loads_.light_load(), loads_.full_load());
+  const FootWeights weights = WeighFeet(sensors.foot_load, weight_);
   const Placement placement = PlaceOnGround(kinematics_, weights);
   InvariantState state;
   state.rotation = Orthonormal(placement.orientation * kinematics_.imu_rotation());
@@ -214,7 +233,7 @@ void InvariantEstimator::Place(const BaseSensors& sensors) {
   Begin(state, kUnplacedTurn, kStartSpeed, kUnplaced);
   for (const Foot f : kFeet) {
     if (!(weights.grip[f] > 0)) continue;  // a leg that hangs carries little
-    for (const int j : kinematics_.joints(f)) unrest_[j] = config_.start_torque();
+    for (const int j : kinematics_.joints(f)) unrest_[j] = kStartTorque;
   }
   UpdateContacts(sensors);
   for (const Foot f : kFeet) {
@@ -291,15 +310,15 @@ void InvariantEstimator::Propagate(double dt) {
   imu.acceleration = 0.5 * (last_force_ + force_);
   // A step at an unknown instant between two readings: uniform over their difference.
   imu.angular_velocity_noise =
-      Square(config_.gyro_noise()) * Matrix3d::Identity() + turn * turn.transpose() / 12;
+      Square(gyro_noise_) * Matrix3d::Identity() + turn * turn.transpose() / 12;
   imu.acceleration_noise =
-      Square(config_.accelerometer_noise()) * Matrix3d::Identity() + push * push.transpose() / 12;
+      Square(accelerometer_noise_) * Matrix3d::Identity() + push * push.transpose() / 12;
   if (!imu_good_ || !last_imu_good_) {
     imu.angular_velocity_noise += Square(kGyroFault) * Matrix3d::Identity();
     imu.acceleration_noise += Square(kAccelerometerFault) * Matrix3d::Identity();
   }
-  imu.gyro_bias_walk = config_.gyro_bias_walk();
-  imu.accelerometer_bias_walk = config_.accelerometer_bias_walk();
+  imu.gyro_bias_walk = kGyroBiasWalk;
+  imu.accelerometer_bias_walk = kAccelerometerBiasWalk;
   filter_.Propagate(imu, dt);
 
   const InvariantFilter::Covariance& c = filter_.covariance();
@@ -314,10 +333,8 @@ void InvariantEstimator::Propagate(double dt) {
   for (const Foot f : kFeet) {
     const FootState& foot = feet_[f];
     filter_.Loosen(
-        f,
-        foot.slip_left > 0 ? Square(config_.slip_speed() * dt)
-                           : Square(config_.contact_walk()) * dt,
-        foot.turn_left > 0 ? Square(config_.turn_speed() * dt) : Square(config_.turn_walk()) * dt);
+        f, foot.slip_left > 0 ? Square(kSlipSpeed * dt) : Square(config_.contact_walk()) * dt,
+        foot.turn_left > 0 ? Square(kTurnSpeed * dt) : Square(kTurnWalk) * dt);
   }
 }
 
@@ -330,8 +347,7 @@ void InvariantEstimator::Recover(bool finite) {
 }
 
 void InvariantEstimator::UpdateContacts(const BaseSensors& sensors) {
-  const FootWeights weights =
-      WeighFeet(sensors.foot_load, weight_, loads_.light_load(), loads_.full_load());
+  const FootWeights weights = WeighFeet(sensors.foot_load, weight_);
   ReadSoles();
   for (const Foot f : kFeet) {
     FootState& foot = feet_[f];
@@ -360,7 +376,7 @@ void InvariantEstimator::UpdateContacts(const BaseSensors& sensors) {
 }
 
 void InvariantEstimator::LetSlip(Foot foot) {
-  feet_[foot].slip_left = config_.rest_time();
+  feet_[foot].slip_left = kRestTime;
   feet_[foot].slip_time = 0;
   BeginRest(foot);
 }
@@ -376,7 +392,7 @@ Eigen::Vector3d InvariantEstimator::Apart(Foot foot) const {
 }
 
 void InvariantEstimator::LetTurn(Foot foot) {
-  feet_[foot].turn_left = config_.rest_time();
+  feet_[foot].turn_left = kRestTime;
   feet_[foot].turn_start = filter_.SeenRotation(feet_[foot].reading);
 }
 
@@ -391,8 +407,8 @@ void InvariantEstimator::Correct(double dt) {
     foot.reading.noise *= scale;
     const InvariantFilter::Innovation test = filter_.Test(f, foot.reading);
     foot.innovation = test.position;
-    moved[f] = (foot.slip_left <= 0 && test.position > config_.gate()) ||
-               (foot.turn_left <= 0 && test.rotation > config_.gate());
+    moved[f] = (foot.slip_left <= 0 && test.position > kSlipGate) ||
+               (foot.turn_left <= 0 && test.rotation > kSlipGate);
     firm += foot.slip_left <= 0 ? 1 : 0;
     if (!moved[f]) {
       const double shown = scale * std::max(test.position, test.rotation) / 3;  // 3: its mean
@@ -406,13 +422,13 @@ void InvariantEstimator::Correct(double dt) {
       if (!foot.loaded || moved[f] != after) continue;
       if (moved[f]) {
         const InvariantFilter::Innovation test = filter_.Test(f, foot.reading);
-        if (foot.slip_left <= 0 && test.position > config_.gate()) {
+        if (foot.slip_left <= 0 && test.position > kSlipGate) {
           LetSlip(f);
-          filter_.Loosen(f, Square(config_.slip_speed() * dt), 0);
+          filter_.Loosen(f, Square(kSlipSpeed * dt), 0);
         }
-        if (foot.turn_left <= 0 && test.rotation > config_.gate()) {
+        if (foot.turn_left <= 0 && test.rotation > kSlipGate) {
           LetTurn(f);
-          filter_.Loosen(f, 0, Square(config_.turn_speed() * dt));
+          filter_.Loosen(f, 0, Square(kTurnSpeed * dt));
         }
       }
       filter_.Correct(f, foot.reading);
@@ -423,7 +439,7 @@ void InvariantEstimator::Correct(double dt) {
   }
 }
 
-// A sole has come to rest when it has hardly moved for rest_time.
+// A sole has come to rest when it has hardly moved for kRestTime.
 void InvariantEstimator::ComeToRest(Foot f, bool other_stands, double dt) {
   FootState& foot = feet_[f];
   if (foot.slip_left > 0) {
@@ -434,13 +450,13 @@ void InvariantEstimator::ComeToRest(Foot f, bool other_stands, double dt) {
       const double way = (filter_.SeenPosition(feet_[f].reading) - foot.slip_start).norm();
       const double speed =
           std::sqrt(filter_.covariance().diagonal().segment<3>(InvariantFilter::kVelocity).sum());
-      const bool together = feet_[Other(f)].loaded &&
-                            (Apart(f) - foot.apart_start).norm() < kTogether * config_.rest_time();
+      const bool together =
+          feet_[Other(f)].loaded && (Apart(f) - foot.apart_start).norm() < kTogether * kRestTime;
       if (!other_stands && (together || foot.slip_time > kLongestSlip)) {
         // The foot is the world then, and the base's velocity is what is wrong.
-        filter_.Doubt(0, Square(way / config_.rest_time()), 0);
-      } else if (way > config_.rest_distance() + 3 * speed * config_.rest_time()) {
-        foot.slip_left = config_.rest_time();
+        filter_.Doubt(0, Square(way / kRestTime), 0);
+      } else if (way > kRestDistance + 3 * speed * kRestTime) {
+        foot.slip_left = kRestTime;
         BeginRest(f);
       }
     }
@@ -449,7 +465,7 @@ void InvariantEstimator::ComeToRest(Foot f, bool other_stands, double dt) {
     foot.turn_left -= dt;
     const double turn =
         RotationLog(filter_.SeenRotation(feet_[f].reading) * foot.turn_start.transpose()).norm();
-    if (foot.turn_left <= 0 && turn > config_.rest_turn()) LetTurn(f);
+    if (foot.turn_left <= 0 && turn > kRestTurn) LetTurn(f);
   }
 }
 
@@ -515,9 +531,9 @@ void InvariantEstimator::Publish() {
   // the last two readings at an unknown instant of it.
   const Vector3d turn = r * (gyro_ - last_gyro_), push = r * (force_ - last_force_);
   const bool fault = !imu_good_;
-  const double gyro_variance = Square(config_.gyro_noise()) + (fault ? Square(kGyroFault) : 0);
+  const double gyro_variance = Square(gyro_noise_) + (fault ? Square(kGyroFault) : 0);
   const double force_variance =
-      Square(config_.accelerometer_noise()) + (fault ? Square(kAccelerometerFault) : 0);
+      Square(accelerometer_noise_) + (fault ? Square(kAccelerometerFault) : 0);
   Eigen::Matrix<double, 9, 3> spread = Eigen::Matrix<double, 9, 3>::Zero();
   spread.middleRows<3>(0) = d * Matrix3d::Identity();
   spread.middleRows<3>(3) = Skew(lever);
@@ -531,7 +547,7 @@ void InvariantEstimator::Publish() {
   // The instant of the readings is uncertain.
   Eigen::Matrix<double, 9, 1> motion;
   motion << rate, acceleration, velocity;
-  base_covariance_.noalias() += Square(config_.timing()) * motion * motion.transpose();
+  base_covariance_.noalias() += Square(kTiming) * motion * motion.transpose();
 }
 
 FootContact InvariantEstimator::contact(Foot foot) const {

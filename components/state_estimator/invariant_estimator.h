@@ -57,7 +57,7 @@ class InvariantEstimator {
     bool loaded = false;
     double slip_left = 0, turn_left = 0;  // s, until it may stand still again; 0: it does
     double slip_time = 0;                 // s, since it began to slip
-    Eigen::Vector3d slip_start = Eigen::Vector3d::Zero();   // where the present rest_time began
+    Eigen::Vector3d slip_start = Eigen::Vector3d::Zero();   // where the present rest began
     Eigen::Vector3d apart_start = Eigen::Vector3d::Zero();  // m, to the other sole then
     Eigen::Matrix3d turn_start = Eigen::Matrix3d::Identity();
     double innovation = 0;
@@ -71,7 +71,7 @@ class InvariantEstimator {
   void ReadImu(const BaseSensors& sensors);
   void ReadSoles();
   /// The filter with standard deviations of rotation (rad), velocity (m/s) and position (m), and of
-  /// the biases and the compliance as configured.
+  /// the biases and the compliance as at the start.
   void Begin(const InvariantState& state, double turn, double speed, double position);
   void Place(const BaseSensors& sensors);
   void DefineWorld(const FootWeights& weights);
@@ -88,8 +88,8 @@ class InvariantEstimator {
   void Publish();
 
   std::shared_ptr<const robot::RobotModel> model_;
-  StateEstimatorConfig loads_;  // whose light_load and full_load weigh feet
   InvariantEkfConfig config_;
+  double gyro_noise_, accelerometer_noise_;  // rad/s, m/s², per sample
   double period_;
   double weight_;                    // N, of the robot
   Eigen::VectorXd encoder_noise_;    // rad, standard deviation by joint

@@ -12,6 +12,8 @@ using robot::kFeet;
 
 // No foot carries more, shares of the robot's weight: keeps every finite reading finite.
 constexpr double kMaxLoad = 100;
+// Shares of the weight, measured, below which a foot no longer stands and from which on it does.
+constexpr double kLightLoad = 0.05, kFullLoad = 0.2;
 // Feet without load at first: beyond this difference of height, m, only the lower one stands.
 constexpr double kLevel = 0.01;
 
@@ -61,14 +63,13 @@ void SoleKinematics::Update(const Eigen::Ref<const Eigen::VectorXd>& position,
   imu_velocity_ = data_.body_linear_velocity[b] + imu_angular_velocity_.cross(arm);
 }
 
-FootWeights WeighFeet(const robot::FootArray<double>& load, double robot_weight, double light_load,
-                      double full_load) {
+FootWeights WeighFeet(const robot::FootArray<double>& load, double robot_weight) {
   FootWeights weights;
   robot::FootArray<double> pull;
   double sum = 0, grip = 0;
   for (const Foot f : kFeet) {
     const double share = std::clamp(load[f] / robot_weight, 0.0, kMaxLoad);
-    weights.grip[f] = CubicStep((share - light_load) / (full_load - light_load));
+    weights.grip[f] = CubicStep((share - kLightLoad) / (kFullLoad - kLightLoad));
     pull[f] = weights.grip[f] * share;
     sum += pull[f];
     grip += weights.grip[f];

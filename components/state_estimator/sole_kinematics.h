@@ -68,10 +68,9 @@ struct FootWeights {
   robot::FootArray<double> share{};  ///< among the gripping feet, sums to 1; 0 when none grips
   double standing = 0;               ///< 0: in flight; 1: the robot stands
 };
-/// `load`: N, upward force on each sole; `robot_weight` N. A foot grips from `light_load` on and
-/// fully from `full_load` on, shares of the weight.
-FootWeights WeighFeet(const robot::FootArray<double>& load, double robot_weight, double light_load,
-                      double full_load);
+/// `load`: N, upward force on each sole; `robot_weight` N. A foot grips from a twentieth of the
+/// weight on and fully from a fifth on; half is a foot's in even standing.
+FootWeights WeighFeet(const robot::FootArray<double>& load, double robot_weight);
 
 struct Placement {
   Eigen::Matrix3d orientation = Eigen::Matrix3d::Identity();  ///< base to world

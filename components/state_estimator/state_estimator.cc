@@ -23,9 +23,6 @@ using robot::kFeet;
 constexpr double kStepCutoff = 60;  // Hz: G1 stands fewer pushes with 80 (docs/lab/steps)
 
 void CheckConfig(StateEstimatorConfig config, const robot::RobotModel& model) {
-  if (config.full_load() <= config.light_load()) {
-    throw ConfigError("full_load", "must be greater than light_load");
-  }
   if (config.invariant_ekf().has_sensor_delay()) return;
   config.mutable_invariant_ekf()->set_sensor_delay(model.drive_train().sensor_delay);
   try {
@@ -66,8 +63,8 @@ void StateEstimator::Configure(const ComponentContext& context, Wiring* wiring) 
   }
   CheckConfig(config, *model);
   wrenches_ = std::make_unique<FootWrenches>(model, config);
-  calibrator_ = std::make_unique<Calibrator>(
-      model, config.calibration(), config.wrench_observer().cutoff(), context.tick_period);
+  calibrator_ =
+      std::make_unique<Calibrator>(model, config.calibration().enabled(), context.tick_period);
   const MessageCounts counts = JointAndFootCounts(*model);
   wiring->AddInput(&robot_sensors_, "robot_sensors", counts);
   wiring->AddOutput(&robot_state_, "robot_state", counts);

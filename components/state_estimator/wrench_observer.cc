@@ -33,14 +33,29 @@ constexpr double kFitTime = 0.3, kPressedFitTime = 5, kFitHold = 1;
 constexpr double kLeastFit = 0.1;  // a third of the deviation
 // s, over which the wrenches' rate of change is averaged.
 constexpr double kRateTime = 0.02;
+// Shares by which joint friction differs from the robot file's, a joint's torque from its current's
+// (a torque constant's tolerance), and the mass from the model's (cables and covers): standard
+// deviations.
+constexpr double kFrictionError = 0.5, kTorqueError = 0.02, kMassError = 0.02;
+// N·m/rad of a joint that sticks, a harmonic drive's: it holds the friction it slipped with until
+// it is bent back.
+constexpr double kFrictionStiffness = 1e4;
+constexpr double kComError = 0.006;  // m by which the COM is not known, standard deviation
+// m/s² by which the base's acceleration is not known once the IMU's bias is: what is left of the
+// bias, and flexing.
+constexpr double kAccelerationError = 0.03;
+// Squared normalised disagreement of base and legs (chi-squared, 6 degrees of freedom) beyond which
+// something pushes the robot, and the base's rows lose weight.
+constexpr double kPushGate = 25;
+// s by which the wrenches lag behind the readings, half of the low-pass's delay: times their rate
+// of change it is part of the covariance.
+constexpr double kLatency = 0.005;
 
 }  // namespace
 
-WrenchObserver::WrenchObserver(std::shared_ptr<const robot::RobotModel> model,
-                               const WrenchObserverConfig& config)
+WrenchObserver::WrenchObserver(std::shared_ptr<const robot::RobotModel> model, double cutoff)
     : model_(std::move(model)),
-      config_(config),
-      filter_(2 * model_->num_joints() + 6, config.cutoff()),
+      filter_(2 * model_->num_joints() + 6, cutoff),
       input_(Eigen::VectorXd::Zero(2 * model_->num_joints() + 6)),
       state_(model_->num_joints()),
       data_(*model_),
@@ -61,8 +76,7 @@ WrenchObserver::WrenchObserver(std::shared_ptr<const robot::RobotModel> model,
     leg_joints_.push_back(j);
     supports_.push_back(supports);
   }
-  errors_ = JointErrors(leg_joints_.size(),
-                        {config_.friction_error(), config_.torque_error(), config_.mass_error()});
+  errors_ = JointErrors(leg_joints_.size(), {kFrictionError, kTorqueError, kMassError});
   torques_.assign(leg_joints_.size(), {});
   residual_ = variance_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(leg_joints_.size()));
   noise_ = bristle_ = bristle_error_ =
@@ -73,8 +87,7 @@ WrenchObserver::WrenchObserver(std::shared_ptr<const robot::RobotModel> model,
     bristle_error_[i] = motor.static_friction / std::sqrt(3.0);
     // White noise passes to the low-pass's second derivative with ω², times 0.8 to 1.
     const double count = 2 * std::numbers::pi / (motor.gear_ratio * motor.encoder_counts);
-    const double acceleration =
-        Square(2 * std::numbers::pi * config.cutoff()) * count / std::sqrt(12.0);
+    const double acceleration = Square(2 * std::numbers::pi * cutoff) * count / std::sqrt(12.0);
     noise_[i] = kLeastVariance;
     if (std::isfinite(acceleration)) noise_[i] += Square(motor.reflected_inertia * acceleration);
   }
@@ -116,9 +129,9 @@ void WrenchObserver::TrackFriction(double dt) {
     if (!(limit > 0)) continue;
     const double way = dt * filter_.rate().head(n)[leg_joints_[k]];
     const double end = std::copysign(limit, way);
-    const double keep = std::exp(-config_.friction_stiffness() * std::abs(way) / limit);
+    const double keep = std::exp(-kFrictionStiffness * std::abs(way) / limit);
     bristle_[i] = end + keep * (bristle_[i] - end);
-    const double error = config_.friction_error() * limit;
+    const double error = kFrictionError * limit;
     bristle_error_[i] = error + keep * (bristle_error_[i] - error);
   }
 }
@@ -226,9 +239,8 @@ void WrenchObserver::AddJointRows() {
     const double held = bristle_[static_cast<Eigen::Index>(k)];
     const double friction = held + motor.viscous_friction * speed;
     double variance = Square(bristle_error_[static_cast<Eigen::Index>(k)]) +
-                      Square(config_.friction_error() * motor.viscous_friction * speed) +
-                      Square(config_.torque_error() * torque) +
-                      Square(config_.mass_error() * joint_torque_[joint]) +
+                      Square(kFrictionError * motor.viscous_friction * speed) +
+                      Square(kTorqueError * torque) + Square(kMassError * joint_torque_[joint]) +
                       noise_[static_cast<Eigen::Index>(k)];
     double known = torque - friction - joint_torque_[joint];
     torques_[k] = {held, torque, joint_torque_[joint]};
@@ -277,9 +289,8 @@ bool WrenchObserver::AddBaseRows() {
   const double size = base_force_.norm();
   robot::Vector6d noise;
   for (int i = 0; i < 3; ++i) {
-    noise[i] = Square(mass * config_.mass_error() * base_force_[i]) +
-               Square(mass * config_.acceleration_error());
-    noise[3 + i] = Square(mass * config_.com_error() * size);
+    noise[i] = Square(mass * kMassError * base_force_[i]) + Square(mass * kAccelerationError);
+    noise[3 + i] = Square(mass * kComError * size);
   }
   const robot::Vector6d gap = base - sum * estimate_;
   const Eigen::Matrix<double, 12, 6> cross = spread_ * sum.transpose();
@@ -289,9 +300,9 @@ bool WrenchObserver::AddBaseRows() {
   Eigen::LLT<Matrix6> factors(total);
   push_excess_ = torque_known_ ? gap.dot(factors.solve(gap)) : 0;
   if (!std::isfinite(push_excess_)) return false;
-  if (push_excess_ > config_.push_gate()) {
+  if (pushed()) {
     // Something else pushes: what the base says is worth less, the more they disagree.
-    total.diagonal() += (Square(push_excess_ / config_.push_gate()) - 1) * noise;
+    total.diagonal() += (Square(push_excess_ / kPushGate) - 1) * noise;
     factors.compute(total);
   }
   const Eigen::Matrix<double, 6, 12> gain = factors.solve(cross.transpose());
@@ -299,6 +310,8 @@ bool WrenchObserver::AddBaseRows() {
   spread_ -= cross * gain;
   return estimate_.allFinite();
 }
+
+bool WrenchObserver::pushed() const { return push_excess_ > kPushGate; }
 
 // What a leg that swings seems to carry is its joints' error.
 void WrenchObserver::Learn(double dt) {
@@ -366,7 +379,7 @@ bool WrenchObserver::Observe(const ObserverCorrection& correction, bool learn) {
     const auto at = 6 * static_cast<Eigen::Index>(f);
     settled_covariance_.block<6, 6>(at, at) *= fit_[f];
   }
-  const Wrenches late = config_.latency() * rate_;
+  const Wrenches late = kLatency * rate_;
   covariance_.noalias() += late * late.transpose();
   return true;
 }

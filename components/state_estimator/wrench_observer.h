@@ -20,9 +20,12 @@
 #include "components/state_estimator/base_sensors.h"
 #include "components/state_estimator/joint_errors.h"
 #include "components/state_estimator/low_pass.h"
-#include "components/state_estimator/state_estimator.pb.h"
 
 namespace poise {
+
+/// Hz, of the second-order low-pass that all readings pass: above it encoder steps become forces,
+/// below it a touch-down is seen late.
+inline constexpr double kObserverCutoff = 40;
 
 /// What else the readings are known to hold, and the robot to carry.
 struct ObserverCorrection {
@@ -38,8 +41,9 @@ class WrenchObserver {
   using Wrenches = Eigen::Matrix<double, 12, 1>;
   using Covariance = Eigen::Matrix<double, 12, 12>;
 
-  WrenchObserver(std::shared_ptr<const robot::RobotModel> model,
-                 const WrenchObserverConfig& config);
+  /// `cutoff`: Hz, of the low-pass that all readings pass.
+  explicit WrenchObserver(std::shared_ptr<const robot::RobotModel> model,
+                          double cutoff = kObserverCutoff);
 
   /// Takes the readings of a tick, `dt` s after the last. The first are taken to be those of a
   /// robot at rest. Allocates nothing, as Observe.
@@ -61,6 +65,8 @@ class WrenchObserver {
   /// Squared normalised disagreement of the base's rows with the legs': chi-squared with 6 degrees
   /// of freedom when nothing but the feet touches the robot.
   double push_excess() const { return push_excess_; }
+  /// Whether that is beyond chance: something pushes the robot.
+  bool pushed() const;
   /// The last Observe found these, in the base frame, without the load: specific force of the
   /// base's origin (acceleration less gravity, m/s²), and the force and moment about the base's
   /// origin that the model asks of the ground (N, N·m).
@@ -83,7 +89,6 @@ class WrenchObserver {
   void Learn(double dt);
 
   std::shared_ptr<const robot::RobotModel> model_;
-  WrenchObserverConfig config_;
   std::vector<int> leg_joints_;
   std::vector<robot::FootArray<bool>> supports_;  // by leg joint: of which feet
   LowPass filter_;                                // positions, gyro, accelerometer, torques

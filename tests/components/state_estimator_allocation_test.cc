@@ -35,10 +35,7 @@ TEST(InvariantEstimator, AllocatesNothingPerTick) {
 TEST(FootWrenchesAndCalibrator, AllocateNothingPerTick) {
   BaseMotion motion(POISE_SOURCE_DIR + std::string("/deploy/robots/dyros/dyros_legs.pbtxt"));
   FootWrenches wrenches(motion.model(), {});
-  CalibrationConfig enabled;
-  enabled.set_enabled(true);
-  Calibrator calibrator(motion.model(), enabled, WrenchObserverConfig().cutoff(),
-                        BaseMotion::kPeriod);
+  Calibrator calibrator(motion.model(), true, BaseMotion::kPeriod);
   const Eigen::VectorXd torque = Eigen::VectorXd::LinSpaced(motion.model()->num_joints(), -9, 9);
   for (int i = 0; i < 30; ++i) {
     motion.Next();

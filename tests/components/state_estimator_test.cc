@@ -205,13 +205,9 @@ INSTANTIATE_TEST_SUITE_P(
     Fields, StateEstimatorConfiguration,
     testing::Values(ConfigCase{"joint_velocity_cutoff: 0", "joint_velocity_cutoff"},
                     ConfigCase{"joint_velocity_cutoff: nan", "joint_velocity_cutoff"},
-                    ConfigCase{"light_load: -0.1", "light_load"},
-                    ConfigCase{"light_load: 0.3", "full_load"},
-                    ConfigCase{"full_load: 0.6", "full_load"},
                     ConfigCase{"invariant_ekf { sensor_delay: 0.1 }", "invariant_ekf.sensor_delay"},
-                    ConfigCase{"invariant_ekf { timing: -1 }", "invariant_ekf.timing"},
-                    ConfigCase{"invariant_ekf { gate: 0 }", "invariant_ekf.gate"},
-                    ConfigCase{"invariant_ekf { gyro_noise: nan }", "invariant_ekf.gyro_noise"}));
+                    ConfigCase{"invariant_ekf { start_yaw: 0 }", "invariant_ekf.start_yaw"},
+                    ConfigCase{"invariant_ekf { cop_margin: nan }", "invariant_ekf.cop_margin"}));
 
 }  // namespace
 }  // namespace poise

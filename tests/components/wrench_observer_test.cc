@@ -141,8 +141,8 @@ class Motion {
     if (!(limit > 0)) return 0;
     constexpr int kSteps = 100;
     const double sign = way < 0 ? -1 : 1;
-    const double stiffness = WrenchObserverConfig().friction_stiffness();
-    for (int i = 0; i < kSteps; ++i) held += stiffness * (1 - sign * held / limit) * way / kSteps;
+    constexpr double kStiffness = 1e4;  // N·m/rad, as the observer takes it
+    for (int i = 0; i < kSteps; ++i) held += kStiffness * (1 - sign * held / limit) * way / kSteps;
     return held;
   }
 
@@ -163,7 +163,7 @@ TEST(WrenchObserver, AtRestItGivesTheStaticWrenchesToRounding) {
   for (const TestRobot robot : {TestRobot::kDyros, TestRobot::kMantis}) {
     for (const double share : {0.5, 0.8, 1.0}) {
       Motion motion(robot, 0);
-      WrenchObserver observer(motion.model(), {});
+      WrenchObserver observer(motion.model());
       motion.At(0, share);
       observer.Track(motion.sensors(), kPeriod);
       ASSERT_TRUE(observer.Observe({}));
@@ -186,9 +186,7 @@ TEST(WrenchObserver, AtRestItGivesTheStaticWrenchesToRounding) {
 TEST(WrenchObserver, InMotionItFollowsTheEquationsOfMotion) {
   for (const TestRobot robot : {TestRobot::kDyros, TestRobot::kMantis}) {
     Motion motion(robot, 0.1);
-    WrenchObserverConfig config;
-    config.set_cutoff(100);
-    WrenchObserver observer(motion.model(), config);
+    WrenchObserver observer(motion.model(), 100);
     double worst = 0;
     for (int tick = 0; tick < 1500; ++tick) {
       const double t = kPeriod * tick;
@@ -211,7 +209,7 @@ TEST(WrenchObserver, ASwingingFootTeachesItsLegAndATouchIsSeenInTime) {
   for (const bool learn : {false, true}) {
     Motion motion(TestRobot::kDyros, 0.5, 0.3);  // so slow that few joints turn back
     motion.SetLegError(0.4, 0.03);
-    WrenchObserver observer(motion.model(), {});
+    WrenchObserver observer(motion.model());
     double squares = 0, touched = -1, seen = -1;
     int count = 0;
     for (int tick = 0; tick < 1600; ++tick) {
@@ -251,7 +249,7 @@ TEST(WrenchObserver, APushOnTheBaseIsNotTakenForTheFeet) {
   robot::Vector6d push;
   push << 30, 300, 0, -60, 0, 20;
   for (const double scale : {1.0, 2.0, 4.0}) {
-    WrenchObserver observer(motion.model(), {});
+    WrenchObserver observer(motion.model());
     motion.At(0, 0.5, scale * push);
     observer.Track(motion.sensors(), kPeriod);
     ASSERT_TRUE(observer.Observe({}));
@@ -268,7 +266,7 @@ TEST(WrenchObserver, APushOnTheBaseIsNotTakenForTheFeet) {
 // Without torques nothing but the sum is known: it is given, and the covariance says so.
 TEST(WrenchObserver, WithoutTorquesTheSumOfBothFeetIsKnown) {
   Motion motion(TestRobot::kDyros, 0);
-  WrenchObserver observer(motion.model(), {});
+  WrenchObserver observer(motion.model());
   motion.At(0, 0.7);
   const BaseSensors read = motion.sensors();
   const BaseSensors without = {
@@ -291,7 +289,7 @@ TEST(WrenchObserver, TheCovarianceIsThatOfTheErrors) {
   motion.At(0, 0.6);
   VectorXd torque(motion.model()->num_joints());
   for (int trial = 0; trial < kTrials; ++trial) {
-    WrenchObserver observer(motion.model(), {});
+    WrenchObserver observer(motion.model());
     const BaseSensors read = motion.sensors();
     for (Eigen::Index j = 0; j < torque.size(); ++j) {
       const double stuck =
@@ -310,12 +308,6 @@ TEST(WrenchObserver, TheCovarianceIsThatOfTheErrors) {
   EXPECT_GE(inside, static_cast<int>(0.93 * kTrials));
 }
 
-CalibrationConfig Enabled() {
-  CalibrationConfig config;
-  config.set_enabled(true);
-  return config;
-}
-
 TEST(Calibrator, FindsALoadAndTheComInTwoSeconds) {
   Motion motion(TestRobot::kDyros, 0.02);
   // The robot carries less than its model says, so that the model's mass is an error to find.
@@ -326,8 +318,8 @@ TEST(Calibrator, FindsALoadAndTheComInTwoSeconds) {
   const robot::Body& is = believed->bodies()[0];
   Calibrator::Load expected;
   expected << was.mass - is.mass, was.mass * was.com - is.mass * is.com;
-  WrenchObserver observer(believed, {});
-  Calibrator calibrator(believed, Enabled(), WrenchObserverConfig().cutoff(), kPeriod);
+  WrenchObserver observer(believed);
+  Calibrator calibrator(believed, true, kPeriod);
   for (int tick = 0; tick < 1000; ++tick) {
     motion.At(kPeriod * tick, 0.5);
     observer.Track(motion.sensors(), kPeriod);
@@ -349,8 +341,8 @@ TEST(Calibrator, FindsALoadAndTheComInTwoSeconds) {
 // Standing still nothing tells the height of the COM; the covariance keeps what was assumed.
 TEST(Calibrator, StandingStillTheHeightIsNotSeen) {
   Motion motion(TestRobot::kDyros, 0);
-  WrenchObserver observer(motion.model(), {});
-  Calibrator calibrator(motion.model(), Enabled(), WrenchObserverConfig().cutoff(), kPeriod);
+  WrenchObserver observer(motion.model());
+  Calibrator calibrator(motion.model(), true, kPeriod);
   const double before = calibrator.covariance()(3, 3);
   motion.At(0, 0.5);
   const WrenchObserver::Wrenches w = motion.wrenches();
