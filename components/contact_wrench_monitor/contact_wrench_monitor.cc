@@ -87,8 +87,6 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
   const double side = config.has_side_margin() ? config.side_margin() : alone;
   CutSoles({alone, side}, &sole_);
   CutSoles(Eigen::Vector2d::Constant(given ? config.sole_margin() : margin), &shared_sole_);
-  cop_feedback_ = config.cop_feedback().share();
-  cop_feedback_time_ = config.cop_feedback().time_constant();
   whole_body_ = context.shared->Get<balance::WholeBody>(
       "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
   const int num_joints = model_->num_joints();
@@ -126,7 +124,7 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
   wiring->AddStage("balance", {&robot_state_, &support_plan_, &task_torque_, &operator_},
                    {&balance_torque_}, [this](const Tick& tick) {
                      TakeActs(tick);
-                     Balance(tick);
+                     Balance();
                    });
   SetPose(Eigen::Isometry3d::Identity(), &balance_torque_->frame_o);
 }
@@ -142,7 +140,6 @@ void ContactWrenchMonitor::AddSettings(double tick_period) {
     add("single_support.half_length", &single_support_.half_length);
     add("single_support.half_width", &single_support_.half_width);
   }
-  settings.Add("cop_feedback.share", &cop_feedback_, 0, 1, kRegionRamp);
 }
 
 void ContactWrenchMonitor::TakeActs(const Tick& tick) {
@@ -153,7 +150,6 @@ void ContactWrenchMonitor::TakeActs(const Tick& tick) {
 bool ContactWrenchMonitor::Archive(StateArchive* archive) {
   operator_.Archive(archive);
   archive->Show(in_contact_);
-  archive->Show(cop_error_, balanced_index_, balanced_time_);
   ArchiveMessage(&*balance_torque_, archive);
   return true;
 }
@@ -164,7 +160,7 @@ void ContactWrenchMonitor::Prepare() {
   if (state_valid_) whole_body_->Update(state_, in_contact_);
 }
 
-void ContactWrenchMonitor::Balance(const Tick& tick) {
+void ContactWrenchMonitor::Balance() {
   const task_torque_t& task = *task_torque_;
   balance_torque_t& out = *balance_torque_;
   const FootArray<bool> in_contact{support_plan_->in_contact[0] != 0,
@@ -176,7 +172,7 @@ void ContactWrenchMonitor::Balance(const Tick& tick) {
     out.status = balance_torque_t::STATUS_INVALID_STATE;
   } else {
     in_contact_ = in_contact;
-    out.status = ComputeBalance(in_contact, tick);
+    out.status = ComputeBalance(in_contact);
   }
   if (out.status == balance_torque_t::STATUS_OK ||
       out.status == balance_torque_t::STATUS_NOT_ACHIEVED) {
@@ -197,7 +193,7 @@ int8_t ContactWrenchMonitor::ComputeDynamics(const FootArray<bool>& in_contact) 
              : balance_torque_t::STATUS_SINGULAR;
 }
 
-int8_t ContactWrenchMonitor::ComputeBalance(const FootArray<bool>& in_contact, const Tick& tick) {
+int8_t ContactWrenchMonitor::ComputeBalance(const FootArray<bool>& in_contact) {
   if (const int8_t status = ComputeDynamics(in_contact); status != balance_torque_t::STATUS_OK) {
     return status;
   }
@@ -207,27 +203,20 @@ int8_t ContactWrenchMonitor::ComputeBalance(const FootArray<bool>& in_contact, c
     return balance_torque_t::STATUS_SINGULAR;
   }
   const balance::ContactLimits limits = Limits(in_contact);
-  balance::ConvexPolygon region =
+  const balance::ConvexPolygon region =
       polygon_ ? Soles(frame_o) : balance::Rectangle({limits.half_length, limits.half_width});
-  if (cop_feedback_ > 0) {
-    UpdateCopError(frame_o, in_contact, tick);
-    for (Eigen::Vector2d& corner : region.mutable_corners()) corner -= cop_feedback_ * cop_error_;
-  }
   if (region.num_corners == 0) return balance_torque_t::STATUS_SINGULAR;
   // The COM follows a centre of pressure in the planner's steps alone.
   const bool steps = balancing_ && support_plan_->com_follows == support_plan_t::FOLLOWS_COP;
   balance::BalanceResult result;
   balance::BalanceStatus status = balance::BalanceStatus::kOk;
   if (!steps || !MoveForStep(geometry, region, &result)) {
-    status = polygon_ || cop_feedback_ > 0 ? Move(geometry, region, &result)
-                                           : Move(geometry, limits, &result);
+    status = polygon_ ? Move(geometry, region, &result) : Move(geometry, limits, &result);
   }
   if (status == balance::BalanceStatus::kSingular || !torque_.allFinite()) {
     return balance_torque_t::STATUS_SINGULAR;
   }
   Report(result, limits, region, in_contact);
-  balanced_index_ = tick.index;
-  balanced_time_ = tick.time;
   const bool achieved = status == balance::BalanceStatus::kOk && Inside(result.cop, region);
   return achieved || !balancing_ ? balance_torque_t::STATUS_OK
                                  : balance_torque_t::STATUS_NOT_ACHIEVED;
@@ -357,30 +346,6 @@ bool ContactWrenchMonitor::MoveForStep(const balance::ContactGeometry& geometry,
   result->cop = result->cop_desired = balance::CenterOfPressure(result->resultant);
   result->active_x = result->active_y = step.changed;
   return true;
-}
-
-void ContactWrenchMonitor::UpdateCopError(const Eigen::Isometry3d& frame_o,
-                                          const FootArray<bool>& in_contact, const Tick& tick) {
-  const balance_torque_t& last = *balance_torque_;
-  const FootArray<bool> last_contact{last.in_contact[0] != 0, last.in_contact[1] != 0};
-  if (balanced_index_ < 0 || last_contact != in_contact) {
-    cop_error_.setZero();
-    return;
-  }
-  // A reading shows the tick before; after skipped ticks it may show any.
-  if (balanced_index_ != tick.index - 1) return;
-  balance::Vector6d measured = balance::Vector6d::Zero();
-  for (const Foot f : kFeet) {
-    if (!in_contact[f]) continue;
-    measured += balance::WrenchTransform(frame_o, whole_body_->data().foot_pose[f]) *
-                GetWrench(robot_state_->foot_wrench[Index(f)]);
-  }
-  const Eigen::Vector2d error =
-      balance::CenterOfPressure(measured) - Eigen::Vector2d(last.cop[0], last.cop[1]);
-  // With a light load the quotient says nothing.
-  if (!(measured(2) < 0.5 * last.resultant.force[2]) || !error.allFinite()) return;
-  const double period = tick.time - balanced_time_;
-  cop_error_ += period / (cop_feedback_time_ + period) * (error - cop_error_);
 }
 
 void ContactWrenchMonitor::CutSoles(const Eigen::Vector2d& margin,

@@ -35,10 +35,10 @@ class ContactWrenchMonitor : public Component, public Operated {
   void AddSettings(double tick_period);
   void TakeActs(const Tick& tick);
   void Prepare();
-  void Balance(const Tick& tick);
+  void Balance();
   /// Dynamics and protected task for these contacts; STATUS_*.
   int8_t ComputeDynamics(const robot::FootArray<bool>& in_contact);
-  int8_t ComputeBalance(const robot::FootArray<bool>& in_contact, const Tick& tick);
+  int8_t ComputeBalance(const robot::FootArray<bool>& in_contact);
   /// BalanceControl by the configured movers, within the joints' limits. torque_ on entry the task
   /// torque.
   template <class Bounds>
@@ -64,10 +64,6 @@ class ContactWrenchMonitor : public Component, public Operated {
                 robot::FootArray<balance::ConvexPolygon>* soles) const;
   /// The hull of the soles in contact, less the margin.
   balance::ConvexPolygon Soles(const Eigen::Isometry3d& frame_o) const;
-  /// Measured less computed centre of pressure, filtered, m, frame O: what a reading of this tick
-  /// says of the tick before.
-  void UpdateCopError(const Eigen::Isometry3d& frame_o, const robot::FootArray<bool>& in_contact,
-                      const Tick& tick);
   void Report(const balance::BalanceResult& result, const balance::ContactLimits& limits,
               const balance::ConvexPolygon& region, const robot::FootArray<bool>& in_contact);
 
@@ -98,10 +94,6 @@ class ContactWrenchMonitor : public Component, public Operated {
   // The soles less the margin, m, sole frames: of a foot alone on the ground, and of one beside the
   // other.
   robot::FootArray<balance::ConvexPolygon> sole_, shared_sole_;
-  double cop_feedback_ = 0, cop_feedback_time_ = 0;  // share, s
-  Eigen::Vector2d cop_error_ = Eigen::Vector2d::Zero();
-  int64_t balanced_index_ = -1;  // tick of the output's centre of pressure; −1: none
-  double balanced_time_ = 0;     // s
   robot::RobotState state_;
   bool state_valid_ = false;
   robot::FootArray<bool> in_contact_{true, true};  // of the last tick

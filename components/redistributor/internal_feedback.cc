@@ -16,6 +16,12 @@ namespace {
 using robot::Foot;
 using robot::FootArray;
 
+// s, time constant with which the answer is let go: no step that a standing robot feels.
+constexpr double kReleaseTime = 0.1;
+// Share of the load from which on the lighter foot is given the whole answer: a foot that hardly
+// touches cannot follow.
+constexpr double kFullShare = 0.1;
+
 double TwoDigits(double value) {
   if (!(value > 0)) return 0;
   const double unit = std::pow(10, std::floor(std::log10(value)) - 1);
@@ -28,20 +34,14 @@ balance::Matrix6d IntoO(const Eigen::Isometry3d& foot) {
 
 }  // namespace
 
-WrenchFeedback WithRobotLimits(WrenchFeedback feedback, const robot::RobotModel& model) {
+FeedbackLimits LimitsOfFeedback(const robot::RobotModel& model) {
   constexpr double kForceShare = 3.0 / 16;  // of the weight: what friction in the legs holds up
   constexpr double kLever = 0.4;            // of the COM's height
   constexpr double kEdgeShare = 0.2;        // of the smaller sole's inner radius
   const double weight = model.total_mass() * robot::kGravity;
   const double force = TwoDigits(kForceShare * weight);
-  if (!feedback.has_max_force()) feedback.set_max_force(force);
-  if (!feedback.has_max_moment()) {
-    feedback.set_max_moment(TwoDigits(kLever * robot::StandingHeight(model) * force));
-  }
-  if (!feedback.has_edge()) {
-    feedback.set_edge(kEdgeShare * SoleRadius(model));
-  }
-  return feedback;
+  return {force, TwoDigits(kLever * robot::StandingHeight(model) * force),
+          kEdgeShare * SoleRadius(model)};
 }
 
 InternalWrench DistributionError(const FootArray<balance::Vector6d>& measured,
@@ -64,39 +64,30 @@ Eigen::Matrix<double, 12, 1> WrenchChange(const InternalWrench& internal,
   return change;
 }
 
-InternalFeedback::InternalFeedback(const WrenchFeedback& config)
-    : enabled_(config.enabled()),
-      proportional_(config.proportional()),
-      rate_(config.integral()),
-      max_force_(config.max_force()),
-      max_moment_(config.max_moment()),
-      release_time_(config.release_time()),
-      full_load_(config.full_load()) {}
-
 InternalWrench InternalFeedback::Limited(InternalWrench wrench) const {
   const auto limit = [](auto part, double most) {
     const double size = part.norm();
     if (size > most) part *= most / size;
   };
-  limit(wrench.head<3>(), max_force_);
-  limit(wrench.tail<3>(), max_moment_);
+  limit(wrench.head<3>(), limits_.force);
+  limit(wrench.tail<3>(), limits_.moment);
   return wrench;
 }
 
 void InternalFeedback::Release(double period) {
   const double counted = TickPeriod(period);
-  integral_ *= counted > 0 ? release_time_ / (release_time_ + counted) : 1.0;
+  integral_ *= counted > 0 ? kReleaseTime / (kReleaseTime + counted) : 1.0;
 }
 
 double InternalFeedback::LoadShare(double eta) const {
   const double lighter = std::min(eta, 1 - eta);
-  return lighter >= full_load_ ? 1.0 : balance::SmoothStep(lighter / full_load_);
+  return lighter >= kFullShare ? 1.0 : balance::SmoothStep(lighter / kFullShare);
 }
 
 InternalWrench InternalFeedback::Update(const InternalWrench& error, double period, double share) {
   if (!error.allFinite()) return Hold(share);
   integral_ = Limited(integral_ + share * rate_ * TickPeriod(period) * error);
-  return share * Limited(integral_ + proportional_ * error);
+  return Hold(share);
 }
 
 }  // namespace poise

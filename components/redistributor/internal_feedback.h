@@ -22,16 +22,21 @@ InternalWrench DistributionError(const robot::FootArray<balance::Vector6d>& meas
 Eigen::Matrix<double, 12, 1> WrenchChange(const InternalWrench& internal,
                                           const robot::FootArray<Eigen::Isometry3d>& foot);
 
-/// `config`, with what it leaves to the robot: docs/reference/robots.md has the rules.
-WrenchFeedback WithRobotLimits(WrenchFeedback config, const robot::RobotModel& model);
+/// What follows from the robot: docs/reference/robots.md has the rules.
+struct FeedbackLimits {
+  double force = 0, moment = 0;  ///< N, and N·m about frame O, of the answer on the right foot
+  /// m from the edge of its sole, nearer than which a foot's computed centre of pressure counts as
+  /// about to tip.
+  double edge = 0;
+};
+FeedbackLimits LimitsOfFeedback(const robot::RobotModel& model);
 
-/// Proportional and integral, within limits; by time, whatever ticks are skipped.
+/// Integral, within limits; by time, whatever ticks are skipped.
 class InternalFeedback {
  public:
   InternalFeedback() = default;
-  /// Takes a configuration with limits. Throws ConfigError "feedback.integral" ...: negative or not
-  /// finite.
-  explicit InternalFeedback(const WrenchFeedback& config);
+  InternalFeedback(const WrenchFeedback& config, const FeedbackLimits& limits)
+      : enabled_(config.enabled()), rate_(config.integral()), limits_(limits) {}
 
   bool enabled() const { return enabled_; }
   /// 1/s; may change between calls.
@@ -40,10 +45,10 @@ class InternalFeedback {
   void Reset() { integral_.setZero(); }
   /// `period`, s, since the last call. A `share` (0..1) of the answer is given, and integrated.
   InternalWrench Update(const InternalWrench& error, double period, double share);
-  /// Lets the answer go in release_time; `period`, s, since the last call.
+  /// Lets the answer go in a tenth of a second; `period`, s, since the last call.
   void Release(double period);
-  /// Share of the answer that acts with this ratio: all while the lighter foot has full_load of the
-  /// load or more, none without load.
+  /// Share of the answer that acts with this ratio: all while the lighter foot has a tenth of
+  /// the load or more, none without load.
   double LoadShare(double eta) const;
   /// The answer where there is no reading to go by.
   InternalWrench Hold(double share) const { return share * integral_; }
@@ -53,10 +58,8 @@ class InternalFeedback {
   InternalWrench Limited(InternalWrench wrench) const;
 
   bool enabled_ = false;
-  double proportional_ = 0, rate_ = 0;
-  double max_force_ = 0, max_moment_ = 0;
-  double release_time_ = 0;  // s
-  double full_load_ = 0;
+  double rate_ = 0;
+  FeedbackLimits limits_;
   InternalWrench integral_ = InternalWrench::Zero();
 };
 

@@ -30,6 +30,8 @@ constexpr double kMostLightShare = 0.45;
 constexpr double kRatioRamp = 0.5;
 // 1/s: half of what shakes a foot on something soft (redistributor.proto).
 constexpr double kMostIntegral = 40;
+// s until readings count again after the answer was let go: the sole comes down.
+constexpr double kFeedbackPause = 0.2;
 // Share of a joint's torque that stays free, so that no motor cuts what rounding adds. StepBalance
 // leaves more free, so that its torques keep this limit.
 constexpr double kTorqueRounding = 1e-6;
@@ -60,10 +62,9 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   if (eta_min_ >= eta_max_) throw ConfigError("eta_min", "must be less than eta_max");
   landed_share_ = config.landed_share();
   ratio_moves_ = RatioMoves(config);
-  const WrenchFeedback feedback = WithRobotLimits(config.feedback(), *model_);
-  feedback_ = InternalFeedback(feedback);
-  feedback_pause_ = feedback.pause();
-  feedback_edge_ = feedback.edge();
+  const FeedbackLimits limits = LimitsOfFeedback(*model_);
+  feedback_ = InternalFeedback(config.feedback(), limits);
+  feedback_edge_ = limits.edge;
   if (feedback_.enabled() && !redistribution_) {
     throw ConfigError("feedback.enabled", "needs redistribution: true");
   }
@@ -293,7 +294,7 @@ void Redistributor::AddFeedback(const Tick& tick, const FootArray<Eigen::Isometr
   // Soles about to tip, and legs that yield, share their load as they can, not as commanded.
   const bool tipping = AboutToTip(desired) || yielding_legs_.any();
   if (tipping) {
-    learn_from_ = tick.time + feedback_pause_;
+    learn_from_ = tick.time + kFeedbackPause;
     if (last_index_ >= 0) feedback_.Release(tick.time - last_time_);
   }
   // A reading shows the command of the tick before; after skipped ticks it may show any.

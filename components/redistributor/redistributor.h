@@ -55,7 +55,7 @@ class Redistributor : public Component, public Operated {
   /// in the sole frames.
   void AddFeedback(const Tick& tick, const robot::FootArray<Eigen::Isometry3d>& sole_in_o,
                    const Wrenches& desired);
-  /// A foot's centre of pressure is nearer than feedback.edge to the edge of its sole.
+  /// A foot's centre of pressure is nearer than feedback_edge_ to the edge of its sole.
   bool AboutToTip(const Wrenches& desired) const;
   /// Share of the feedback that acts at this ratio and in a transition: none without load, so that
   /// a change of support makes no step.
@@ -84,8 +84,7 @@ class Redistributor : public Component, public Operated {
   PlannedImpedance impedance_;
   YieldingLegs yielding_legs_;
   SwingFriction swing_friction_;
-  double feedback_pause_ = 0;  // s
-  double feedback_edge_ = 0;   // m
+  double feedback_edge_ = 0;  // m
   // A reading answers to the last distribution, which these are of; index −1: none.
   int64_t last_index_ = -1;
   double last_time_ = 0;  // s

@@ -15,14 +15,11 @@ constexpr double kStiffnessTime = 0.1;  // s
 PlannedImpedance::PlannedImpedance(const SharedImpedance& config, const robot::RobotModel& model,
                                    double period) {
   if (!config.enabled()) return;
-  horizon_ =
-      config.has_horizon() ? config.horizon() : model.drive_train().sensor_delay + period / 2;
+  horizon_ = model.drive_train().sensor_delay + period / 2;
   const double rotor_time = config.has_rotor_time() ? config.rotor_time() : kRotorTime;
-  const double stiffness_time =
-      config.has_stiffness_time() ? config.stiffness_time() : kStiffnessTime;
   for (const robot::MotorModel& motor : model.motors()) {
     damping_.push_back(motor.reflected_inertia / rotor_time);
-    stiffness_.push_back(damping_.back() / stiffness_time);
+    stiffness_.push_back(damping_.back() / kStiffnessTime);
   }
 }
 

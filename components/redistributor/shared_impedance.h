@@ -13,7 +13,7 @@ namespace poise {
 /// computed to cause, from the state to when the command acts, it gives the torque itself as long
 /// as the joint moves so: the commanded wrenches stay what they are, and only the deviation is
 /// answered. By joint, damping is the reflected inertia of the rotor over rotor_time, stiffness the
-/// damping over stiffness_time; a joint without rotor inertia has neither.
+/// damping over a tenth of a second; a joint without rotor inertia has neither.
 class PlannedImpedance {
  public:
   PlannedImpedance() = default;

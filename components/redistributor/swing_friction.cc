@@ -11,18 +11,25 @@ using robot::Foot;
 using robot::FootArray;
 using robot::kFeet;
 
-double FrictionTorque(const robot::MotorModel& motor, double velocity, double smoothing) {
-  return motor.coulomb_friction * std::tanh(velocity / smoothing) +
+namespace {
+
+constexpr double kSmoothing = 0.05;  // rad/s
+// s in which the torque comes or goes at the quickest.
+constexpr double kFrictionRamp = 0.05;
+// Share of F_z from which on a foot in contact holds its leg against friction by itself, and gets
+// none. The less it carries the more it gets.
+constexpr double kFadeLoad = 0.5;
+
+}  // namespace
+
+double FrictionTorque(const robot::MotorModel& motor, double velocity) {
+  return motor.coulomb_friction * std::tanh(velocity / kSmoothing) +
          motor.viscous_friction * velocity;
 }
 
 SwingFriction::SwingFriction(const FrictionCompensation& config, const robot::RobotModel& model,
                              double period)
-    : share_(config.share()),
-      lead_(config.lead()),
-      smoothing_(config.smoothing_velocity()),
-      rate_(period / config.ramp()),
-      fade_load_(config.fade_load()) {
+    : share_(config.share()), lead_(config.lead()), rate_(period / kFrictionRamp) {
   if (share_ == 0) return;
   for (int j = 0; j < model.num_joints(); ++j) {
     const Joint joint{j, model.CarriedFeet(j), model.motors()[static_cast<size_t>(j)]};
@@ -36,8 +43,8 @@ void SwingFriction::Ramp(const FootArray<bool>& in_contact, bool ramped, double 
   for (const Foot f : kFeet) {
     double open = 1;
     if (in_contact[f]) {
-      const bool fades = ramped && load[f] < fade_load_;
-      open = fades ? 1 - std::max(load[f], 0.0) / fade_load_ : 0;
+      const bool fades = ramped && load[f] < kFadeLoad;
+      open = fades ? 1 - std::max(load[f], 0.0) / kFadeLoad : 0;
     }
     swing_[f] = std::clamp(open, swing_[f] - rate_, swing_[f] + rate_);
   }
@@ -52,7 +59,7 @@ void SwingFriction::Add(const Eigen::Ref<const Eigen::VectorXd>& velocity,
     if (swing == 0) continue;
     const double asked = velocity[joint.index] + lead_ * acceleration[joint.index];
     torque[static_cast<size_t>(joint.index)] +=
-        share_ * balance::SmoothStep(swing) * FrictionTorque(joint.motor, asked, smoothing_);
+        share_ * balance::SmoothStep(swing) * FrictionTorque(joint.motor, asked);
   }
 }
 

@@ -13,10 +13,10 @@ namespace poise {
 
 /// N·m that a motor needs against Coulomb and viscous friction at the joint's `velocity`, rad/s,
 ///   τ_c tanh(q̇ / smoothing) + d q̇:
-/// odd and increasing, below the robot file's friction by 0.24 τ_c at `smoothing` (rad/s, > 0) and
-/// less beyond it. Static friction's excess is left out: it would make the torque steepest where
-/// the velocity's sign is least known.
-double FrictionTorque(const robot::MotorModel& motor, double velocity, double smoothing);
+/// odd and increasing, below the robot file's friction by 0.24 τ_c at a smoothing of 0.05 rad/s and
+/// less beyond it, so that the torque does not chatter at rest. Static friction's excess is left
+/// out: it would make the torque steepest where the velocity's sign is least known.
+double FrictionTorque(const robot::MotorModel& motor, double velocity);
 
 /// The tasks take the joints for free of friction, so that dry friction holds an error of τ_c over
 /// the joint's stiffness, and viscous friction lets the leg follow late: a foot out of contact
@@ -52,9 +52,7 @@ class SwingFriction {
   std::vector<Joint> joints_;  // of the legs, with friction; none: not enabled
   double share_ = 0;
   double lead_ = 0;                 // s
-  double smoothing_ = 1;            // rad/s
   double rate_ = 0;                 // of the ramp, in a tick
-  double fade_load_ = 0;            // share of F_z
   robot::FootArray<double> swing_;  // 0 holds the leg, 1 swings
 };
 

@@ -79,19 +79,16 @@ TEST(DistributionError, IsZeroForAnyResultantSharedAsCommanded) {
   }
 }
 
-WrenchFeedback Config(double proportional, double integral) {
+InternalFeedback Feedback(double integral) {
   WrenchFeedback config;
-  config.set_max_force(100);
-  config.set_max_moment(30);
   config.set_enabled(true);
-  config.set_proportional(proportional);
   config.set_integral(integral);
-  return config;
+  return {config, {.force = 100, .moment = 30, .edge = 0}};
 }
 
 TEST(InternalFeedback, IntegratesTimeAndNotCalls) {
   const InternalWrench error = InternalWrench::Constant(1);
-  InternalFeedback often(Config(0, 10)), seldom(Config(0, 10));
+  InternalFeedback often = Feedback(10), seldom = Feedback(10);
   for (int i = 0; i < 50; ++i) often.Update(error, 0.002, 1);
   for (int i = 0; i < 10; ++i) seldom.Update(error, 0.01, 1);
   EXPECT_NEAR(often.Hold(1)[0], 10 * 0.1, 1e-12);
@@ -99,7 +96,7 @@ TEST(InternalFeedback, IntegratesTimeAndNotCalls) {
 }
 
 TEST(InternalFeedback, StaysWithinItsLimitsAndTurnsBackAtOnce) {
-  InternalFeedback feedback(Config(0.5, 100));
+  InternalFeedback feedback = Feedback(100);
   InternalWrench error;
   error << 300, 0, 400, 0, 50, 0;
   InternalWrench answer;
@@ -112,7 +109,7 @@ TEST(InternalFeedback, StaysWithinItsLimitsAndTurnsBackAtOnce) {
 }
 
 TEST(InternalFeedback, SensesNothingFromWhatIsNotFinite) {
-  InternalFeedback feedback(Config(0.5, 100));
+  InternalFeedback feedback = Feedback(100);
   feedback.Update(InternalWrench::Constant(1), 0.002, 1);
   const InternalWrench before = feedback.Hold(1);
   EXPECT_EQ(feedback.Update(InternalWrench::Constant(NAN), 0.002, 1), before);
@@ -265,10 +262,8 @@ TEST_F(ClosedLoop, AnUnloadedFootAndSingleSupportKnowNone) {
 
 TEST_F(ClosedLoop, ASoleAboutToTipLetsItGoAndItLearnsAgainAfterThePause) {
   ControlContext context(robot::TestRobot::kDyros);
-  Harness<Redistributor> harness(
-      &context,
-      RedistributorText(
-          "feedback { enabled: true integral: 25 release_time: 0.1 pause: 0.2 edge: 0.02 }"));
+  Harness<Redistributor> harness(&context,
+                                 RedistributorText("feedback { enabled: true integral: 25 }"));
   Bind(&harness);
   const joint_command_t& out = harness.output<joint_command_t>();
   int tick = 0;
@@ -299,7 +294,7 @@ TEST_F(ClosedLoop, ASoleAboutToTipLetsItGoAndItLearnsAgainAfterThePause) {
 }
 
 TEST(InternalFeedback, ALightFootIsGivenLess) {
-  const InternalFeedback feedback(Config(0, 10));
+  const InternalFeedback feedback = Feedback(10);
   EXPECT_EQ(feedback.LoadShare(0.5), 1);
   EXPECT_EQ(feedback.LoadShare(0.1), 1);
   EXPECT_NEAR(feedback.LoadShare(0.9), 1, 1e-12);
@@ -311,8 +306,7 @@ TEST(InternalFeedback, ALightFootIsGivenLess) {
 
 TEST_F(ClosedLoop, SkippedTicksHoldWhatIsKnown) {
   ControlContext context(robot::TestRobot::kDyros);
-  Harness<Redistributor> harness(&context,
-                                 RedistributorText("feedback { enabled: true proportional: 0 }"));
+  Harness<Redistributor> harness(&context, RedistributorText("feedback { enabled: true }"));
   Bind(&harness);
   const joint_command_t& out = harness.output<joint_command_t>();
   for (int tick = 0; tick < 50; ++tick) {
@@ -338,11 +332,6 @@ TEST(InternalFeedback, RefusesGainsThatCannotBe) {
     return "accepted";
   };
   EXPECT_EQ(field_of("feedback { integral: -1 }"), "feedback.integral");
-  EXPECT_EQ(field_of("feedback { proportional: nan }"), "feedback.proportional");
-  EXPECT_EQ(field_of("feedback { max_force: -1 }"), "feedback.max_force");
-  EXPECT_EQ(field_of("feedback { pause: -1 }"), "feedback.pause");
-  EXPECT_EQ(field_of("feedback { full_load: 0.6 }"), "feedback.full_load");
-  EXPECT_EQ(field_of("feedback { edge: -0.1 }"), "feedback.edge");
   EXPECT_EQ(field_of("feedback { enabled: true } redistribution: false"), "feedback.enabled");
   EXPECT_EQ(field_of("feedback { enabled: true }"), "accepted");
 }

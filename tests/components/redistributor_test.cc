@@ -546,13 +546,10 @@ TEST(Redistributor, LimitsOfTheFeedbackAreThoseOfTheRobot) {
   const balance::ContactLimits limits = ReadLimits(WithinSoles({}, model, 0.005), "");
   EXPECT_NEAR(limits.half_length, 0.145, 1e-12);
   EXPECT_NEAR(limits.half_width, 0.07, 1e-12);
-  const WrenchFeedback feedback = WithRobotLimits({}, model);
-  EXPECT_EQ(feedback.max_force(), 100);
-  EXPECT_EQ(feedback.max_moment(), 30);
-  EXPECT_NEAR(feedback.edge(), 0.015, 1e-12);
-  WrenchFeedback own;
-  own.set_max_force(7);
-  EXPECT_EQ(WithRobotLimits(own, model).max_force(), 7);
+  const FeedbackLimits feedback = LimitsOfFeedback(model);
+  EXPECT_EQ(feedback.force, 100);
+  EXPECT_EQ(feedback.moment, 30);
+  EXPECT_NEAR(feedback.edge, 0.015, 1e-12);
 }
 
 }  // namespace

@@ -17,10 +17,9 @@ namespace {
 
 using robot::TestRobot;
 
-constexpr double kPeriod = 2e-3;     // s
-constexpr double kShare = 0.8;       // as walking has it
-constexpr double kSmoothing = 0.05;  // rad/s, the field's default
-constexpr double kLead = 0.02;       // s, likewise
+constexpr double kPeriod = 2e-3;  // s
+constexpr double kShare = 0.8;    // as walking has it
+constexpr double kLead = 0.02;    // s, the field's default
 
 FrictionCompensation Config(double share) {
   FrictionCompensation config;
@@ -119,14 +118,14 @@ TEST(SwingFrictionTest, IsOddIncreasingAndAtMostTheFilesFriction) {
   motor.viscous_friction = 0.5;
   double before = -std::numeric_limits<double>::infinity();
   for (double v = -4; v <= 4; v += 1e-3) {
-    const double torque = FrictionTorque(motor, v, kSmoothing);
-    EXPECT_EQ(torque, -FrictionTorque(motor, -v, kSmoothing));
+    const double torque = FrictionTorque(motor, v);
+    EXPECT_EQ(torque, -FrictionTorque(motor, -v));
     EXPECT_GT(torque, before);
     EXPECT_LE(std::abs(torque), 2 + 0.5 * std::abs(v));
     before = torque;
   }
-  EXPECT_EQ(FrictionTorque(motor, 0, kSmoothing), 0);
-  EXPECT_NEAR(FrictionTorque(motor, 1, kSmoothing), 2.5, 1e-12);
+  EXPECT_EQ(FrictionTorque(motor, 0), 0);
+  EXPECT_NEAR(FrictionTorque(motor, 1), 2.5, 1e-12);
 }
 
 // Through lift-off, touch-down and jumps of the load no tick changes the torque by more than the
@@ -138,7 +137,7 @@ TEST(SwingFrictionTest, ComesAndGoesWithoutAStep) {
   const Eigen::VectorXd acceleration = Eigen::VectorXd::Constant(model.num_joints(), -3);
   const auto count = static_cast<size_t>(model.num_joints());
   std::vector<double> before(count, 0.0);
-  constexpr double kRamp = 0.05;          // s, the field's default
+  constexpr double kRamp = 0.05;          // s
   constexpr double kSteepest = 15.0 / 8;  // of 10 s³ − 15 s⁴ + 6 s⁵, at its middle
   double most = 0;
   for (int tick = 0; tick < 300; ++tick) {
@@ -148,7 +147,7 @@ TEST(SwingFrictionTest, ComesAndGoesWithoutAStep) {
     std::vector<double> torque(count, 0.0);
     friction.Add(velocity, acceleration, torque);
     for (size_t j = 0; j < count; ++j) {
-      const double whole = kShare * FrictionTorque(model.motors()[j], 0.6 - kLead * 3, kSmoothing);
+      const double whole = kShare * FrictionTorque(model.motors()[j], 0.6 - kLead * 3);
       EXPECT_LE(std::abs(torque[j] - before[j]), kSteepest * kPeriod / kRamp * whole + 1e-12);
       most = std::max(most, torque[j]);
     }
@@ -161,17 +160,14 @@ TEST(SwingFrictionTest, ComesAndGoesWithoutAStep) {
   EXPECT_GT(most, 0);
 }
 
-// The foot that a load is moved from gets the more the less it carries, the other one nothing; with
-// `fade_load` 0 neither does.
+// The foot that a load is moved from gets the more the less it carries, the other one nothing.
 TEST(SwingFrictionTest, ComesAsTheLoadGoes) {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kMantis);
   const Eigen::VectorXd velocity = Eigen::VectorXd::Ones(model.num_joints());
   const Eigen::VectorXd rest = Eigen::VectorXd::Zero(model.num_joints());
   const auto count = static_cast<size_t>(model.num_joints());
-  FrictionCompensation none = Config(kShare);
-  none.set_fade_load(0);
   for (const robot::Foot light : robot::kFeet) {
-    SwingFriction friction(Config(kShare), model, kPeriod), airborne(none, model, kPeriod);
+    SwingFriction friction(Config(kShare), model, kPeriod);
     const auto at = static_cast<size_t>(AnkleOf(model, light));
     const auto loaded = static_cast<size_t>(AnkleOf(model, Other(light)));
     // A foot that a push unloads, off any ramp, is left to its friction.
@@ -186,10 +182,8 @@ TEST(SwingFrictionTest, ComesAsTheLoadGoes) {
       EXPECT_GE(torque[at], before);
       EXPECT_EQ(torque[loaded], 0);
       before = torque[at];
-      airborne.Ramp({true, true}, true, eta);
-      EXPECT_FALSE(airborne.acts());
     }
-    EXPECT_NEAR(before, kShare * FrictionTorque(model.motors()[at], 1, kSmoothing), 1e-9);
+    EXPECT_NEAR(before, kShare * FrictionTorque(model.motors()[at], 1), 1e-9);
   }
 }
 
@@ -231,7 +225,7 @@ TEST(SwingFrictionTest, IsAddedBehindTheCommandOfTheSwingingLeg) {
         continue;
       }
       const double asked = state.joint_velocity[j] + kLead * q[6 + j];
-      EXPECT_NEAR(added, kShare * FrictionTorque(model.motors()[i], asked, kSmoothing), 1e-6);
+      EXPECT_NEAR(added, kShare * FrictionTorque(model.motors()[i], asked), 1e-6);
       most = std::max(most, std::abs(added));
     }
     if (robot == TestRobot::kDyros) {
@@ -241,8 +235,7 @@ TEST(SwingFrictionTest, IsAddedBehindTheCommandOfTheSwingingLeg) {
 }
 
 TEST(SwingFrictionTest, RefusesWhatIsNoShareOrTime) {
-  for (const char* value : {"share: -0.1", "share: 1.1", "share: nan", "lead: -1", "ramp: 0",
-                            "smoothing_velocity: 0"}) {
+  for (const char* value : {"share: -0.1", "share: 1.1", "share: nan", "lead: -1"}) {
     const std::string text = value;
     EXPECT_EQ(RefusedField(fmt::format("friction_compensation {{ {} }}", text)),
               "friction_compensation." + text.substr(0, text.find(':')));

@@ -59,10 +59,9 @@ class Chain {
       : context_(robot),
         planner_(&context_, Phases(robot)),
         task_(&context_, TaskControllerText()),
-        monitor_(&context_, MonitorConfig(true, 0.05, 0.05) + " cop_feedback { share: 0.5 }"),
-        redistributor_(&context_,
-                       RedistributorText("feedback { enabled: true integral: 200 pause: 0.002 } "
-                                         "friction_compensation { share: 0.8 }")) {
+        monitor_(&context_, MonitorConfig(true, 0.05, 0.05)),
+        redistributor_(&context_, RedistributorText("feedback { enabled: true integral: 200 } "
+                                                    "friction_compensation { share: 0.8 }")) {
     task_.Bind("support_plan", &plan());
     monitor_.Bind("support_plan", &plan());
     monitor_.Bind("task_torque", &task());
