@@ -18,6 +18,15 @@ constexpr double kVelocityMargin = 5;
 // s: by then a torque beyond friction has moved a joint by a count, with the readings' delay and a
 // rotor of 0.5 kg·m² on the coarsest encoder at the joint.
 constexpr double kResponseTime = 0.02;
+// s without a count from an encoder, after which it is frozen if its torque changed by more than
+// frozen_torque kResponseTime ago or before.
+constexpr double kFrozenTime = 0.1;
+// Hz, cut-off of the low-pass on the joint velocity that damping uses. Far above it the encoder's
+// steps become torque; much lower, its lag makes the damping of light ankles (0.1 kg·m²) oscillate.
+constexpr double kVelocityCutoff = 60;
+// Cycles in a row with torque_error after which a measured torque is implausible: a current loop
+// settles in one or two.
+constexpr int kTorqueErrorCycles = 10;
 
 bool Plausible(double value) { return std::abs(value) <= kImplausible; }  // false for NaN
 
@@ -34,10 +43,9 @@ bool Plausible(const wrench_t& wrench) {
 
 FeedbackMonitor::FeedbackMonitor(const SupervisorConfig& config)
     : config_(config),
-      frozen_cycles_(std::max(1, config.Cycles(config.settings.frozen_time()))),
+      frozen_cycles_(std::max(1, config.Cycles(kFrozenTime))),
       response_cycles_(std::max(1, config.Cycles(kResponseTime))),
-      velocity_gain_(
-          1 - std::exp(-2 * std::numbers::pi * config.settings.velocity_cutoff() * config.period)),
+      velocity_gain_(1 - std::exp(-2 * std::numbers::pi * kVelocityCutoff * config.period)),
       counts_(config.motors.size(), 0),
       velocity_(config.motors.size(), 0.0),
       raw_velocity_(config.motors.size(), 0.0),
@@ -108,9 +116,8 @@ FeedbackMonitor::Problem FeedbackMonitor::FindFault(const drive_feedback_t& feed
     const double beyond = feedback.current[j] - std::clamp(feedback.current[j], least, greatest);
     const bool differs = motor.current_sensor && watch.enabled &&
                          std::abs(JointTorque(motor, beyond)) > config_.thresholds.torque_error;
-    const int most = config_.settings.torque_error_cycles();
-    watch.error_cycles = differs ? std::min(watch.error_cycles + 1, most) : 0;
-    if (differs && watch.error_cycles >= most) {
+    watch.error_cycles = differs ? std::min(watch.error_cycles + 1, kTorqueErrorCycles) : 0;
+    if (differs && watch.error_cycles >= kTorqueErrorCycles) {
       return {bridge_status_t::REASON_TORQUE_IMPLAUSIBLE, static_cast<int>(j)};
     }
   }

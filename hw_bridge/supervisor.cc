@@ -15,6 +15,16 @@ using Status = bridge_status_t;
 // s, of the low-pass on the speed of a joint that stops the robot: a blow on an arm throws it
 // faster than any motor, and is shorter. A robot that falls for it has lost more.
 constexpr double kSpeedTime = 0.1;
+// Cycles: a command older than this many is refused as stale; without a younger one it is no longer
+// followed.
+constexpr int kStaleCycles = 3;
+constexpr double kStopRamp = 0.1;  // s over which the damping torque is ramped out in a stop
+// s that a motor may carry its peak current: less than servo drives themselves allow (3 s), which
+// then never limit.
+constexpr double kOverloadTime = 2;
+constexpr double kPositionMargin = 0.05;  // rad beyond a joint's limit at which the bridge trips
+// s in which the tilt's gyro is corrected by the accelerometer: pushes are shorter.
+constexpr double kTiltTime = 1;
 
 /// By Refusal.
 constexpr int8_t kReasons[kNumRefusals] = {
@@ -26,13 +36,13 @@ constexpr int8_t kReasons[kNumRefusals] = {
 
 Supervisor::Supervisor(const SupervisorConfig& config)
     : config_(config),
-      gate_(static_cast<int>(config.motors.size()), config.settings.damping_after_cycles()),
+      gate_(static_cast<int>(config.motors.size()), kStaleCycles),
       monitor_(config),
-      tilt_(config.upright, config.settings.tilt_time()),
+      tilt_(config.upright, kTiltTime),
       speed_gain_(1 - std::exp(-config.period / kSpeedTime)),
-      stop_ramp_cycles_(config.Cycles(config.settings.stop_ramp())),
+      stop_ramp_cycles_(config.Cycles(kStopRamp)),
       first_ramp_cycles_(config.Cycles(config.settings.first_command_ramp())),
-      resume_cycles_(config.Cycles(config.settings.resume_time())),
+      resume_cycles_(config.Cycles(config.resume_time)),
       hold_cycles_(config.settings.on_lost_command() == HwBridgeConfig::HOLD
                        ? config.Cycles(config.settings.hold_time())
                        : 0),
@@ -51,7 +61,7 @@ Supervisor::Supervisor(const SupervisorConfig& config)
     const robot::MotorModel& motor = config.motors[j];
     config_.torque_limit[j] =
         std::min(config.torque_limit[j], JointTorque(motor, motor.peak_current));
-    thermal_.emplace_back(motor.rated_current, motor.peak_current, config.settings.overload_time());
+    thermal_.emplace_back(motor.rated_current, motor.peak_current, kOverloadTime);
   }
 }
 
@@ -143,12 +153,12 @@ void Supervisor::ReadBus(const BusHealth& health) {
 
 void Supervisor::CountLateness(double lateness) {
   lateness_ = lateness;
-  const bool late = lateness > config_.settings.overrun_lateness() * config_.period;
+  const bool late = lateness > config_.overrun_lateness * config_.period;
   late_[static_cast<size_t>(cycles_++ % 100)] = late;
   overruns_ += late ? 1 : 0;
   overruns_in_a_row_ = late ? overruns_in_a_row_ + 1 : 0;
-  if (overruns_in_a_row_ >= config_.settings.overruns_in_a_row() ||
-      static_cast<int>(late_.count()) >= config_.settings.overruns_in_100()) {
+  if (overruns_in_a_row_ >= config_.overruns_in_a_row ||
+      static_cast<int>(late_.count()) >= config_.overruns_in_100) {
     Latch(Status::STATE_STOPPING, Status::REASON_CYCLE_OVERRUN);
   }
 }
@@ -158,9 +168,8 @@ double Supervisor::Position(size_t joint) const {
 }
 
 bool Supervisor::Inside(size_t joint) const {
-  const double margin = config_.settings.position_margin();
-  return Position(joint) >= config_.lower[joint] - margin &&
-         Position(joint) <= config_.upper[joint] + margin;
+  return Position(joint) >= config_.lower[joint] - kPositionMargin &&
+         Position(joint) <= config_.upper[joint] + kPositionMargin;
 }
 
 /// Motors at rest where they can be: else the reason says which is not.
@@ -171,7 +180,7 @@ bool Supervisor::MayStart() {
   }
   for (size_t j = 0; j < torque_.size(); ++j) {
     const bool inside = Inside(j);
-    const bool at_rest = std::abs(joint_velocity()[j]) <= config_.settings.start_velocity();
+    const bool at_rest = std::abs(joint_velocity()[j]) <= config_.start_velocity;
     if (inside && at_rest) continue;
     Enter(Status::STATE_INIT,
           inside ? Status::REASON_START_VELOCITY : Status::REASON_START_POSITION,
@@ -239,7 +248,7 @@ void Supervisor::UpdateState(int64_t cycle, const joint_command_t* command) {
 /// The states of a bridge that has accepted a command, which is `age` cycles old.
 void Supervisor::Follow(int64_t age) {
   const bool first = AwaitsFirst();
-  const bool fresh = !first && age <= config_.settings.damping_after_cycles();
+  const bool fresh = !first && age <= kStaleCycles;
   if (state_ == Status::STATE_ENABLING) {
     if (!fresh && !first) {  // nothing to follow: down again
       Enter(Status::STATE_INIT, last_refusal_);
@@ -277,10 +286,10 @@ void Supervisor::Hold() {
 }
 
 void Supervisor::UpdateLoss(int64_t age) {
-  const int64_t damping_after = int64_t{config_.settings.damping_after_cycles()} + hold_cycles_;
+  const int64_t damping_after = int64_t{kStaleCycles} + hold_cycles_;
   if (age <= damping_after) {
     Hold();
-  } else if (age <= damping_after + config_.settings.stop_after_cycles()) {
+  } else if (age <= damping_after + config_.stop_after_cycles) {
     Enter(Status::STATE_DAMPING, last_refusal_);
   } else {
     Latch(Status::STATE_STOPPING, last_refusal_);
@@ -333,12 +342,11 @@ double Supervisor::WantedTorque(size_t joint) const {
 /// Confined to what the robot bears.
 Impedance Supervisor::FollowedImpedance(size_t joint, int8_t* limits) const {
   Impedance result = impedance_[joint];
-  const double margin = config_.settings.position_margin();
   const double most = config_.velocity_limit[joint];
   bool confined = Confine(0, config_.thresholds.stiffness_limit[joint], &result.stiffness);
   confined |= Confine(0, config_.thresholds.damping_limit[joint], &result.damping);
-  confined |=
-      Confine(config_.lower[joint] - margin, config_.upper[joint] + margin, &result.position);
+  confined |= Confine(config_.lower[joint] - kPositionMargin,
+                      config_.upper[joint] + kPositionMargin, &result.position);
   confined |= Confine(-most, most, &result.velocity);
   confined |=
       result.LimitTorque(Position(joint), joint_velocity()[joint], config_.torque_limit[joint]);
@@ -430,7 +438,7 @@ double Supervisor::OrderedTorque(size_t joint, const drive_command_t& command) c
 
 /// Near a soft limit torque that leads further out fades to nothing at the limit.
 double Supervisor::FadePosition(size_t joint, double torque) const {
-  const double range = config_.settings.soft_range();
+  const double range = config_.soft_range;
   const double room =
       torque > 0 ? config_.upper[joint] - Position(joint) : Position(joint) - config_.lower[joint];
   return range <= 0 || room >= range ? torque : torque * std::max(0.0, room / range);

@@ -30,7 +30,7 @@ namespace poise {
 ///             the position where it was lost; an accepted command leads back. Before the first
 ///             command: no torque but these two, about the position at the start
 ///   DAMPING   the same, −damping × joint velocity
-///   STOPPING  latched: damping ramped out over stop_ramp
+///   STOPPING  latched: damping ramped out over 0.1 s
 ///   STOPPED   latched: motors free
 ///   ESTOP     both, by operator, STO or signal
 /// Limits hold for the drive's whole torque as of the last reading: stiffness and damping deviate

@@ -23,6 +23,19 @@ struct SupervisorConfig {
   int num_feet = 2;
   int current_cycles = 1;        ///< as old as a reading of a current may be
   bool drive_impedance = false;  ///< the drives close stiffness and damping; else the supervisor
+  /// Cycles of damping without an accepted command after which the bridge stops for good (latched):
+  /// at 500 Hz the first cycle in which the command is older than 25 ms.
+  int stop_after_cycles = 9;
+  /// s in which a command that is back is faded in: too short for the robot to move, long enough
+  /// for no step.
+  double resume_time = 0.02;
+  /// rad/s, greatest joint speed at the start: above an encoder's noise and a hanging leg's sway.
+  double start_velocity = 0.5;
+  double soft_range = 0.05;     ///< rad before a joint's limit in which torque towards it fades out
+  double overrun_lateness = 1;  ///< share of the period by which a cycle begins late: an overrun
+  /// Cycles that overrun in a row and stop the bridge: as long without a cycle in time as the
+  /// drives' own watchdog allows at 500 Hz, 50 ms; and of the last hundred.
+  int overruns_in_a_row = 25, overruns_in_100 = 50;
 
   /// Cycles of a time, at least the time.
   int Cycles(double seconds) const { return static_cast<int>(std::ceil(seconds / period - 1e-9)); }

@@ -11,9 +11,7 @@ namespace poise {
 class CycleJudge {
  public:
   /// Cycles without usable inputs, in a row and of the last hundred, that make a bus unusable.
-  CycleJudge(uint32_t most_in_a_row, uint32_t most_in_100)
-      : most_in_a_row_(static_cast<int>(most_in_a_row)),
-        most_in_100_(static_cast<int>(most_in_100)) {}
+  static constexpr int kMostInARow = 5, kMostIn100 = 20;
 
   /// A cycle: its inputs are `usable`; `silent`: nothing came back at all.
   void Count(bool usable, bool silent, BusHealth* health) {
@@ -24,9 +22,9 @@ class CycleJudge {
     health->bad_in_100 = static_cast<int>(bad_.count());
     silent_in_a_row_ = silent ? silent_in_a_row_ + 1 : 0;
     if (health->usable &&
-        (health->bad_in_a_row >= most_in_a_row_ || health->bad_in_100 >= most_in_100_)) {
+        (health->bad_in_a_row >= kMostInARow || health->bad_in_100 >= kMostIn100)) {
       health->usable = false;
-      health->link_lost = silent_in_a_row_ >= most_in_a_row_;
+      health->link_lost = silent_in_a_row_ >= kMostInARow;
     }
   }
   /// Forgets bad cycles: the bus is usable again.
@@ -38,7 +36,6 @@ class CycleJudge {
   }
 
  private:
-  int most_in_a_row_, most_in_100_;
   int silent_in_a_row_ = 0;
   std::bitset<100> bad_;  // by cycle, modulo 100
 };

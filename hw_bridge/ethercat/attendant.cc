@@ -178,7 +178,7 @@ void Attendant::StartClock(size_t slave) {
       Complain(from, error.what());  // it has no time to give; another may
     }
   }
-  StartSync0(&access, config_->cycle(), config_->sync0_shift());
+  StartSync0(&access, config_->cycle());
 }
 
 void Attendant::Rejoin(size_t slave) {

@@ -46,12 +46,12 @@ void JoinClock(Transactions* transactions, SlaveAccess* reference, SlaveAccess* 
              static_cast<int64_t>(time + static_cast<uint64_t>(int64_t{delay}) - unit));
 }
 
-void StartSync0(SlaveAccess* slave, uint32_t cycle, int32_t shift) {
+void StartSync0(SlaveAccess* slave, uint32_t cycle) {
   const auto period = static_cast<int64_t>(cycle);
   slave->Write<uint8_t>(reg::kDcActivation, 0);
   slave->Write<uint8_t>(reg::kDcCyclicUnit, 0);  // the master's
   const auto now = slave->Read<int64_t>(reg::kDcSystemTime);
-  const int64_t start = (now + kSync0Lead) / period * period + period + shift;
+  const int64_t start = (now + kSync0Lead) / period * period + period + period / 2;
   slave->Write<int64_t>(reg::kDcStart, start);
   slave->Write<uint32_t>(reg::kDcSync0Cycle, cycle);
   slave->Write<uint8_t>(reg::kDcActivation, 0x03);  // cyclic unit and SYNC0

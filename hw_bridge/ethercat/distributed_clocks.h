@@ -22,8 +22,9 @@ void SetUpClocks(Transactions* transactions, std::span<SlaveAccess* const> slave
 void JoinClock(Transactions* transactions, SlaveAccess* reference, SlaveAccess* slave,
                int32_t delay);
 
-/// Starts a slave's SYNC0 at `shift` ns (modulo `cycle`) of the common time.
-void StartSync0(SlaveAccess* slave, uint32_t cycle, int32_t shift);
+/// Starts a slave's SYNC0 half a `cycle` (ns) after each cycle of the common time begins: a late
+/// frame is before its SYNC0 still.
+void StartSync0(SlaveAccess* slave, uint32_t cycle);
 
 /// A difference to the common time, ns, from register 0x092C.
 constexpr int32_t DcDifference(uint32_t value) {

@@ -89,8 +89,7 @@ EthercatDriveBus::EthercatDriveBus(LinkOpener open_link, const EthercatBusConfig
     : open_link_(std::move(open_link)),
       config_(Completed(config, model)),
       master_(nullptr, config_.master()),
-      steering_(config.master().cycle()),
-      judge_(config.most_bad_in_a_row(), config.most_bad_in_100()) {
+      steering_(config.master().cycle()) {
   const auto& drives = config_.master().drive();
   for (int j = 0; j < model.num_joints(); ++j) {
     const robot::MotorModel& motor = model.motors()[static_cast<size_t>(j)];
@@ -204,15 +203,9 @@ std::string EthercatDriveBus::Stop() {
 
 CycleResult EthercatDriveBus::ReceiveFrames() {
   cycle_start_ = link_->Now();
-  CycleResult result;
-  if (answer_) {
-    result = *answer_;
-  } else if (sent_) {
-    result = master_.Receive(cycle_start_);
-  }
+  if (sent_ && !answer_) master_.Receive(cycle_start_);
   sent_ = false;
   answer_.reset();
-  if (!config_.fresh_inputs()) return result;
   const int64_t wait = config_.simulated_time()
                            ? int64_t{config_.master().frame_timeout()} * kMillisecond
                            : int64_t{config_.input_wait()} * 1000;
@@ -316,7 +309,7 @@ void EthercatDriveBus::Send(const drive_command_t& command) {
     }
     master_.set_outputs(drive.slave, outputs);
   }
-  sent_ = master_.Send(config_.fresh_inputs() ? Exchange::kWrite : Exchange::kReadWrite);
+  sent_ = master_.Send(Exchange::kWrite);
   // Simulated time goes on only once the drives have what was sent.
   if (sent_ && config_.simulated_time()) {
     answer_ =

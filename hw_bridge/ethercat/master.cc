@@ -22,9 +22,6 @@ const MasterConfig& Checked(const MasterConfig& config) {
               std::all_of(config.drive().begin(), config.drive().end(), own_profile),
           "profile is missing: which drives are on the bus?");
   require(config.drive_size() > 0, "drive is missing: name each drive of the chain");
-  require(
-      static_cast<uint32_t>(std::abs(static_cast<int64_t>(config.sync0_shift()))) < config.cycle(),
-      "sync0_shift must be less than a cycle");
   return config;
 }
 
@@ -236,7 +233,7 @@ void Master::SetUpDistributedClocks() {
   SetUpClocks(&transactions_, with_clock, delays, Now());
   AwaitClocks();
   for (SlaveAccess* slave : with_clock) {
-    StartSync0(slave, config_.cycle(), config_.sync0_shift());
+    StartSync0(slave, config_.cycle());
   }
   clocks_.running = true;
 }

@@ -49,8 +49,7 @@ UnitreeDriveBus::UnitreeDriveBus(RobotLinkOpener open_link, const UnitreeBusConf
     : open_link_(std::move(open_link)),
       config_(Checked(config, period)),
       period_(std::llround(period * 1e9)),
-      stop_buttons_(ButtonsOf(StopButtons(config))),
-      judge_(config.most_bad_in_a_row(), config.most_bad_in_100()) {
+      stop_buttons_(ButtonsOf(StopButtons(config))) {
   const std::vector<size_t> slots = MotorSlots(model, config.layout(), config.slot());
   for (size_t j = 0; j < slots.size(); ++j) {
     const robot::MotorModel& motor = model.motors()[j];
@@ -170,7 +169,7 @@ void UnitreeDriveBus::TakeImu() {
   if (torso) torso_missed_ = link_->ReceiveTorsoImu(&torso_imu_) ? 0 : torso_missed_ + 1;
   const ImuState& imu = torso ? torso_imu_ : state_.imu_state;
   // An old reading is none: the supervisor stops at what is no number.
-  const bool old = torso && torso_missed_ >= int64_t{config_.most_bad_in_a_row()};
+  const bool old = torso && torso_missed_ >= CycleJudge::kMostInARow;
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   for (size_t i = 0; i < 3; ++i) {
     feedback_.imu_angular_velocity[i] = old ? kNone : static_cast<double>(imu.gyroscope[i]);

@@ -15,6 +15,10 @@
 namespace poise::unitree {
 namespace {
 
+constexpr int16_t kTemperature = 45;   // °C of all motors
+constexpr float kVoltage = 52;         // V of all motors
+constexpr float kWatchdogDamping = 8;  // N·m·s/rad, what the makers' examples damp with
+
 bool AllFinite(const MotorCmd& motor) {
   return std::isfinite(motor.q + motor.dq + motor.tau + motor.kp + motor.kd);
 }
@@ -71,8 +75,8 @@ void EmulatedRobot::FillMotors(const drive_feedback_t& feedback) {
     motor.dq = static_cast<float>(feedback.velocity[j]);
     motor.tau_est = static_cast<float>(JointTorque(motors_[j], feedback.current[j]));
     motor.mode = taken_.motor_cmd[slots_[j]].mode;
-    motor.temperature[0] = motor.temperature[1] = static_cast<int16_t>(config_.temperature());
-    motor.vol = static_cast<float>(config_.voltage());
+    motor.temperature[0] = motor.temperature[1] = kTemperature;
+    motor.vol = kVoltage;
     motor.motorstate = 0;
   }
   known_ = true;
@@ -161,7 +165,7 @@ void EmulatedRobot::Act(drive_command_t* motors) {
     if (damping()) {
       motor = {};
       motor.mode = kMotorEnabled;
-      motor.kd = static_cast<float>(config_.watchdog_damping());
+      motor.kd = kWatchdogDamping;
     }
     const Trouble* error = Find(UnitreeTrouble::MOTOR_ERROR);
     const bool enabled =

@@ -14,6 +14,8 @@ namespace poise {
 std::string_view unitree_emulator_proto_schema();  // generated
 namespace {
 
+// The maker's controller that is active until the motion switcher releases it.
+constexpr const char* kMakerMode = "ai";
 constexpr int32_t kDepth = 64;  // commands under way: a process that was left out catches up
 
 }  // namespace
@@ -24,7 +26,7 @@ struct UnitreeEmulator::Ends {
         states(participant, unitree::kStateTopic),
         torso_imu(participant, unitree::kTorsoImuTopic),
         commands(participant, unitree::kCommandTopic, kDepth),
-        switcher(participant, config.maker_mode()) {}
+        switcher(participant, kMakerMode) {}
 
   unitree::Participant participant;
   unitree::Writer<unitree::LowState> states;
@@ -45,7 +47,7 @@ void UnitreeEmulator::Configure(const ComponentContext& context, Wiring* wiring)
   } catch (const unitree::UnitreeError& error) {
     throw ConfigError("", error.what());
   }
-  robot_->SetMakerActive(!config_.maker_mode().empty());
+  robot_->SetMakerActive(true);
   const MessageCounts counts = JointAndFootCounts(*model);
   MessageTraits<drive_feedback_t>::Resize(last_feedback_, counts);
   for (int j = 0; j < model->num_joints(); ++j) {

@@ -463,7 +463,7 @@ TEST_F(Behaviour, AFrozenEncoderStops) {
     rig.Step(true, i % 2 == 0 ? 0.1 : -0.1);
     if (rig.status().state != Status::STATE_RUNNING) cycles = i;
   }
-  Report("(12) encoder frozen, torque varies", "stop (frozen_time 0.1 s)", cycles);
+  Report("(12) encoder frozen, torque varies", "stop (0.1 s)", cycles);
   EXPECT_EQ(rig.status().reason, Status::REASON_ENCODER_FROZEN);
   EXPECT_EQ(rig.status().reason_joint, static_cast<int>(kHip));
   EXPECT_GE(cycles, 48);

@@ -196,17 +196,19 @@ TEST(HwBridge, AnEmergencyStopIsLatched) {
 }
 
 TEST(HwBridge, MissingCommandsLeadToDampingAndToAStop) {
-  Bridge bridge("damping_after_cycles: 1 stop_after_cycles: 2 stop_ramp: 0.004");
+  Bridge bridge;
   bridge.command.torque.assign(kMotors, 10);
   bridge.Step();
-  std::vector<int> states;
-  for (int i = 0; i < 6; ++i) {
-    bridge.Step(false);
-    states.push_back(bridge.status().state);
-  }
   using S = bridge_status_t;
-  EXPECT_THAT(states, testing::ElementsAre(S::STATE_RUNNING, S::STATE_DAMPING, S::STATE_DAMPING,
-                                           S::STATE_STOPPING, S::STATE_STOPPING, S::STATE_STOPPED));
+  // Three cycles late is not late; nine of damping; the ramp's 0.1 s.
+  for (const auto& [state, cycles] :
+       {std::pair(S::STATE_RUNNING, 3), std::pair(S::STATE_DAMPING, 9),
+        std::pair(S::STATE_STOPPING, 50), std::pair(S::STATE_STOPPED, 1)}) {
+    for (int i = 0; i < cycles; ++i) {
+      bridge.Step(false);
+      ASSERT_EQ(bridge.status().state, state) << i;
+    }
+  }
   EXPECT_EQ(bridge.drives().enabled, std::vector<int8_t>(kMotors, 0));
 }
 
@@ -261,12 +263,7 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(ConfigCase{"torque_limit_share: 0", "torque_limit_share"},
                     ConfigCase{"torque_limit_share: 1.1", "torque_limit_share"},
                     ConfigCase{"torque_limit_share: nan", "torque_limit_share"},
-                    ConfigCase{"damping_after_cycles: -1", "damping_after_cycles"},
-                    ConfigCase{"stop_after_cycles: -1", "stop_after_cycles"},
-                    ConfigCase{"damping: inf", "damping"}, ConfigCase{"damping: -1", "damping"},
-                    ConfigCase{"stop_ramp: -0.1", "stop_ramp"},
-                    ConfigCase{"stop_ramp: nan", "stop_ramp"},
-                    ConfigCase{"velocity_cutoff: 0", "velocity_cutoff"}));
+                    ConfigCase{"damping: inf", "damping"}, ConfigCase{"damping: -1", "damping"}));
 
 TEST(HwBridge, AJointWithoutTorqueIsNamed) {
   std::string robot = ReadDeployed("dyros_legs.pbtxt");

@@ -34,12 +34,10 @@ inline SupervisorConfig ThreeJoints() {
   // A test gives the limits that it is about; what is not given here is as it is shipped.
   config.settings.set_velocity_trip(kInfinity);
   config.settings.set_tilt_limit(kInfinity);
-  config.settings.set_start_velocity(kInfinity);
-  config.settings.set_resume_time(0);
+  config.start_velocity = kInfinity;
+  config.resume_time = 0;
   config.settings.set_enable_cycles(2);
-  config.settings.set_damping_after_cycles(3);
-  config.settings.set_stop_after_cycles(13);
-  config.settings.set_stop_ramp(0.1);
+  config.stop_after_cycles = 13;
   config.thresholds.slew_limit = kInfinity;
   config.thresholds.frozen_torque = kInfinity;
   config.thresholds.torque_error = kInfinity;

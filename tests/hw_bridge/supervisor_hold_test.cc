@@ -16,7 +16,7 @@ SupervisorConfig Holding() {
   config.settings.set_hold_time(0.2);  // 100 cycles
   config.thresholds.hold_stiffness.assign(config.motors.size(), 600);
   config.thresholds.hold_damping.assign(config.motors.size(), 10);
-  config.settings.set_resume_time(0.02);  // 10 cycles
+  config.resume_time = 0.02;  // 10 cycles
   return config;
 }
 
@@ -118,7 +118,7 @@ TEST(SupervisorHold, WithoutFeedbackTheSpringKeepsItsLastLength) {
 SupervisorConfig HoldingFromTheStart() {
   SupervisorConfig config = Holding();
   config.settings.set_hold_before_command(true);
-  config.settings.set_start_velocity(0.5);
+  config.start_velocity = 0.5;
   return config;
 }
 

@@ -17,8 +17,7 @@ TEST(SupervisorStart, WaitsForJointsInTheirRangeAndAtRest) {
   SupervisorConfig config = ThreeJoints();
   config.lower.assign(kJoints, -0.5);
   config.upper.assign(kJoints, 0.5);
-  config.settings.set_position_margin(0.05);
-  config.settings.set_start_velocity(0.5);
+  config.start_velocity = 0.5;
   Bench bench(config);
   bench.Step(nullptr, 0.6 / 0.002);  // to 0.6 rad
   for (int i = 0; i < 20; ++i) {
@@ -65,7 +64,6 @@ TEST(SupervisorLimits, HeatHoldsTheCurrentToTheRating) {
   SupervisorConfig config = ThreeJoints();
   for (robot::MotorModel& motor : config.motors) motor.rated_current = motor.peak_current / 2;
   config.torque_limit.assign(kJoints, 1e6);
-  config.settings.set_overload_time(2);
   Bench bench(config);
   int at_peak = 0;
   double squares = 0;
@@ -90,8 +88,7 @@ SupervisorConfig Ranged() {
   SupervisorConfig config = ThreeJoints();
   config.lower.assign(kJoints, -0.5);
   config.upper.assign(kJoints, 0.5);
-  config.settings.set_soft_range(0.1);
-  config.settings.set_position_margin(0.05);
+  config.soft_range = 0.1;
   return config;
 }
 
@@ -206,7 +203,6 @@ TEST(SupervisorTrips, GyroBiasIsNoTilt) {
 
 TEST(SupervisorTrips, AnEncoderThatStandsStillWhileTorqueChangesIsFrozen) {
   SupervisorConfig config = ThreeJoints();
-  config.settings.set_frozen_time(50 * config.period);
   config.thresholds.frozen_torque = 20;
   Bench bench(config);
   bench.Run(200, 10, 0);
@@ -225,10 +221,9 @@ TEST(SupervisorTrips, AnEncoderThatStandsStillWhileTorqueChangesIsFrozen) {
 }
 
 // OP3 stands so still that the step in its knees' torque with which a walk begins comes after more
-// than frozen_time without a count; two cycles later they move.
+// than 0.1 s without a count; two cycles later they move.
 TEST(SupervisorTrips, AJointThatAStepInItsTorqueMovesIsNotFrozen) {
   SupervisorConfig config = ThreeJoints();
-  config.settings.set_frozen_time(50 * config.period);
   config.thresholds.frozen_torque = 20;
   Bench bench(config);
   bench.Run(200, 10, 0);
@@ -242,7 +237,6 @@ TEST(SupervisorTrips, AnOldReadingOfATorqueThatChangesIsPlausible) {
   for (const int cycles : {1, 3}) {
     SupervisorConfig config = ThreeJoints();
     config.thresholds.torque_error = 15;
-    config.settings.set_torque_error_cycles(10);
     config.current_cycles = cycles;
     Bench bench(config);
     double old = 0, last = 0;
@@ -261,7 +255,6 @@ TEST(SupervisorTrips, AnOldReadingOfATorqueThatChangesIsPlausible) {
 TEST(SupervisorTrips, ATorqueThatIsNotTheCommandedOneForTenCycles) {
   SupervisorConfig config = ThreeJoints();
   config.thresholds.torque_error = 15;
-  config.settings.set_torque_error_cycles(10);
   Bench bench(config);
   const auto follow = [&](double torque) {
     for (size_t j = 0; j < kJoints; ++j) {
@@ -303,9 +296,9 @@ TEST(SupervisorTrips, ABusThatIsNoLongerUsable) {
 
 TEST(SupervisorTrips, OverrunsInARowOrOfAHundred) {
   SupervisorConfig config = ThreeJoints();
-  config.settings.set_overrun_lateness(0.5);  // of 2 ms
-  config.settings.set_overruns_in_a_row(5);
-  config.settings.set_overruns_in_100(20);
+  config.overrun_lateness = 0.5;  // of 2 ms
+  config.overruns_in_a_row = 5;
+  config.overruns_in_100 = 20;
   for (const int every : {1, 4, 6}) {
     Bench bench(config);
     int cycles = 0;

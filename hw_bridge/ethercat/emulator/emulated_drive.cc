@@ -8,6 +8,12 @@ namespace poise::ethercat {
 namespace {
 
 constexpr double kNanosecondsPerMs = 1e6;
+// s that the motor bears the peak torque before I²t holds it to the rated one, and how fast it
+// recovers: that of servo motors of this size.
+constexpr double kPeakTime = 3;
+// Per mille of rated torque in a ms: the current loop's bandwidth, about 1 kHz, reaches the peak in
+// under 1 ms.
+constexpr double kTorqueSlew = 3000;
 constexpr double kMostShown = 32767;  // per mille, of an INTEGER16
 constexpr uint8_t kRw = ObjectDictionary::kWritable;
 constexpr uint8_t kRx = ObjectDictionary::kWritable | ObjectDictionary::kRxMappable;
@@ -59,7 +65,7 @@ EmulatedDrive::EmulatedDrive(const EmulatedDriveConfig& config, ObjectDictionary
   add(object::kRatedCurrent, 4, kRw, "Motor rated current", config.rated_current());
   add(object::kRatedTorque, 4, kRw, "Motor rated torque",
       config.rated_torque() * config.torque_unit());
-  add(0x6087, 4, kRw, "Torque slope", static_cast<uint32_t>(1e3 * config.torque_slew()));
+  add(0x6087, 4, kRw, "Torque slope", static_cast<uint32_t>(1e3 * kTorqueSlew));
   add(object::kSupportedModes, 4, kReadOnly, "Supported drive modes",
       1U << (kModeCyclicTorque - 1));
   // Interpolation time period: 2 x 10^-3 s.
@@ -191,10 +197,10 @@ void EmulatedDrive::Follow(uint16_t controlword, bool reset_edge) {
 }
 
 double EmulatedDrive::TorqueLimit(double elapsed_ms) {
-  // I²t above the rating: full after peak_time at the peak, empty after as long without torque.
+  // I²t above the rating: full after kPeakTime at the peak, empty after as long without torque.
   const double peak = std::max(1.0, config_.peak_torque() * 1e-3);
   const double per_unit = torque_ * 1e-3;
-  const double budget = std::max(peak * peak - 1, 1e-3) * config_.peak_time();
+  const double budget = std::max(peak * peak - 1, 1e-3) * kPeakTime;
   heat_ = std::clamp(heat_ + (per_unit * per_unit - 1) * elapsed_ms * 1e-3 / budget, 0.0, 1.0);
   if (heat_ >= 1) overheated_ = true;
   if (heat_ <= 0) overheated_ = false;
@@ -211,7 +217,7 @@ void EmulatedDrive::UpdateTorque(double elapsed_ms) {
     const auto target = static_cast<double>(static_cast<int16_t>(target_torque_->value));
     wanted = std::clamp(target, -limit, limit);
     limited_ = wanted != target;
-    const double step = config_.torque_slew() * elapsed_ms;
+    const double step = kTorqueSlew * elapsed_ms;
     // A limit acts at once, a target through the slew.
     torque_ = std::clamp(torque_, -limit, limit);
     torque_ += std::clamp(wanted - torque_, -step, step);

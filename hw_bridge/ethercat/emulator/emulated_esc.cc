@@ -9,7 +9,8 @@ namespace poise::ethercat {
 namespace {
 
 constexpr size_t kRegisters = 0x1000;
-constexpr int kSyncManagerArea = 5;  // bytes: start, length, control
+constexpr int64_t kEepromTime = 100'000;  // ns that an EEPROM word takes to be read
+constexpr int kSyncManagerArea = 5;       // bytes: start, length, control
 
 /// Counters, which a write clears, whatever is written.
 bool IsCounter(size_t address) {
@@ -207,7 +208,7 @@ void EmulatedEsc::AfterWrite(size_t address, std::span<const uint8_t> data) {
     uint16_t status = kEeprom8Bytes;
     if ((command & 0x0700) == kEepromReadCommand) {
       status |= kEepromBusy;
-      eeprom_ready_ = now_ + static_cast<int64_t>(config_.eeprom_time() * 1e3);
+      eeprom_ready_ = now_ + kEepromTime;
     } else if ((command & 0x0700) != 0) {
       status |= 0x2000;  // command error: nothing but reading is known
     }

@@ -9,6 +9,9 @@
 namespace poise::ethercat {
 namespace {
 
+// ns from an AL state's request to that state, of real drives' order, SAFE-OP included; and that an
+// SDO takes to be answered.
+constexpr int64_t kAlTransitionTime = 5'000'000, kMailboxTime = 500'000;
 constexpr uint16_t kMailboxOutStart = 0x1000, kMailboxInStart = 0x1080, kMailboxSize = 0x80;
 constexpr uint16_t kOutputsStart = 0x1100, kInputsStart = 0x1400;
 constexpr uint16_t kRxFixed = 0x1600, kRxUser = 0x1607, kTxFixed = 0x1A00, kTxUser = 0x1A07;
@@ -394,7 +397,7 @@ void EmulatedSlave::FinishTransition() {
       return;
     }
   }
-  if (now_ - requested_at_ >= Nanoseconds(config_.al_transition_time())) Enter(*requested_);
+  if (now_ - requested_at_ >= kAlTransitionTime) Enter(*requested_);
 }
 
 void EmulatedSlave::AnswerMailbox() {
@@ -418,7 +421,7 @@ void EmulatedSlave::AnswerMailbox() {
     const bool repeated = message && message->counter != 0 && message->counter == request_counter_;
     if (message && !repeated) {
       request_counter_ = message->counter;
-      reply_at_ = now_ + Nanoseconds(config_.mailbox_time() * 1e-3);
+      reply_at_ = now_ + kMailboxTime;
       if (message->type == MailboxType::kCoe) {
         request_.emplace(message->payload.begin(), message->payload.end());
       } else if (message->type != MailboxType::kError) {
