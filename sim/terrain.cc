@@ -17,7 +17,8 @@ using std::numbers::pi;
 namespace {
 
 constexpr uint64_t kTerrainStream = 1, kFieldStream = 101;
-constexpr double kLaneMiddle = 0.1;  // m from y = 0, about where feet come down
+constexpr double kWavelength = 0.12;  // m from crest to crest of a block's irregularity
+constexpr double kLaneMiddle = 0.1;   // m from y = 0, about where feet come down
 
 Vector2d Slope(double roll, double pitch) {
   // The normal is the z axis turned by roll about x, then by pitch about y.
@@ -48,8 +49,7 @@ Terrain::Terrain(const SimConfig& config, uint64_t seed) {
   wave_amplitude_ = block.irregularity() / kWaves;
   for (Wave& wave : waves_) {
     const double direction = 2 * pi * random.Uniform();
-    wave.number = 2 * pi / block.irregularity_wavelength() *
-                  Vector2d(std::cos(direction), std::sin(direction));
+    wave.number = 2 * pi / kWavelength * Vector2d(std::cos(direction), std::sin(direction));
     wave.phase = 2 * pi * random.Uniform();
   }
 }

@@ -29,6 +29,8 @@ constexpr double kLeastFriction = mjMINMU;
 constexpr double kSlipTolerance = 1e-8;  // m/s
 constexpr double kSlipShare = 1e-7;
 constexpr int kMostSolutions = 60;
+// m/(N·s), at which a point of a sole that sticks creeps sideways, on ground and block.
+constexpr double kFrictionSoftness = 1e-9;
 constexpr double kLeastPace = 0.05, kMostPace = 20;
 
 static_assert(sizeof(mjtNum) == sizeof(double),
@@ -62,7 +64,6 @@ MujocoWorld::MujocoWorld(const MujocoConfig& config, const robot::RobotModel& mo
       step_(step),
       time_constant_(config.contact_time_constant()),
       softness_(config.contact_softness()),
-      friction_softness_(config.friction_softness()),
       robot_(BuildMujocoRobot(model, max_contacts, step)),
       contacts_(static_cast<size_t>(max_contacts)) {
   const MujocoReports reports;
@@ -280,7 +281,7 @@ void MujocoWorld::SetLaws() {
     d->efc_R[row] = contact.law.softness / step_;
     d->efc_D[row] = 1 / d->efc_R[row];
     for (int k = row + 1; k < row + cone.dim; ++k) {
-      d->efc_R[k] = friction_softness_ / step_;
+      d->efc_R[k] = kFrictionSoftness / step_;
       d->efc_D[k] = 1 / d->efc_R[k];
       d->efc_aref[k] = -d->efc_vel[k] / step_;
     }
@@ -329,7 +330,7 @@ MujocoWorld::SlipChange MujocoWorld::FindSlipChange() {
     const double speed = std::hypot(d->efc_vel[row + 1] + step_ * d->efc_b[row + 1],
                                     d->efc_vel[row + 2] + step_ * d->efc_b[row + 2]);
     // A point that sticks creeps: only what is beyond that counts as slip.
-    const double creep = friction_softness_ * cone.friction[0] * d->efc_force[row];
+    const double creep = kFrictionSoftness * cone.friction[0] * d->efc_force[row];
     const double change = std::max(0.0, speed - creep) - contact.slip;
     all.largest = std::max(all.largest, std::abs(change) / (kSlipTolerance + kSlipShare * speed));
     const double difference = change - contact.slip_change;

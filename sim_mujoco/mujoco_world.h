@@ -96,7 +96,7 @@ class MujocoWorld : public World {
 
   const robot::RobotModel& model_;
   double step_;
-  double time_constant_, softness_, friction_softness_;
+  double time_constant_, softness_;
   MujocoRobot robot_;
   MujocoDataPtr data_;
   std::vector<Contact> contacts_;
