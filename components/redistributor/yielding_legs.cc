@@ -16,6 +16,9 @@ constexpr double kFullLoad = 0.3;      // of the weight, asked of a foot: one th
 constexpr double kBounceTime = 10e-3;  // s, of the low-pass on a load: bounces are shorter
 constexpr double kDeviations = 2;      // of the reading, which may show less than the foot bears
 constexpr double kYieldTime = 5e-3;    // s, rotor's inertia over damping
+// Of a standing leg's share, below which what does not stand yields, too: with 1 a bounce would
+// hold up a step.
+constexpr double kGroundShare = 0.25;
 
 }  // namespace
 
@@ -25,9 +28,9 @@ YieldingLegs::YieldingLegs(const robot::RobotModel& model, double period)
       full_load_(kFullLoad * model.total_mass() * robot::kGravity) {
   for (int j = 0; j < model.num_joints(); ++j) {
     const auto index = static_cast<size_t>(j);
-    Joint joint{.index = index, .carries = model.CarriedFeet(j)};
-    joint.damping = model.motors()[index].reflected_inertia / kYieldTime;
-    if (Count(joint.carries) > 0) joints_.push_back(joint);
+    joints_.push_back({.index = index,
+                       .carries = model.CarriedFeet(j),
+                       .damping = model.motors()[index].reflected_inertia / kYieldTime});
   }
 }
 
@@ -37,23 +40,31 @@ double YieldingLegs::BorneShare(Foot foot, const robot_state_t& measured,
   const double hidden = kDeviations * measured.foot_wrench_deviation[i].force[2];
   const double now = -measured.foot_wrench[i].force[2] + hidden, most = load_[foot] + hidden;
   const double asked = -command.foot_wrench[i].force[2];
-  const double needed = kLoadShare * (asked - light_load_);
+  const double needed = kLoadShare * (std::abs(asked) - light_load_);
   if (asked > full_load_ && std::min(now, most) >= needed) has_borne_[foot] = true;
   return has_borne_[foot] && needed > 0 && most < needed ? std::max(most, 0.0) / needed : 1;
 }
 
 void YieldingLegs::Yield(const FootArray<bool>& in_contact, const robot_state_t& measured,
                          joint_command_t* command) {
-  FootArray<double> borne(1.0);  // a swinging foot asks for no load
+  FootArray<double> borne(1.0);
+  double standing = Count(in_contact) > 0 ? 0.0 : 1.0;
   for (const Foot f : kFeet) {
     const double load = -measured.foot_wrench[Index(f)].force[2];
     if (std::isfinite(load)) load_[f] += load_gain_ * (load - load_[f]);
     has_borne_[f] = has_borne_[f] && in_contact[f];
-    if (in_contact[f]) borne[f] = BorneShare(f, measured, *command);
+    if (!in_contact[f]) continue;
+    borne[f] = BorneShare(f, measured, *command);
+    standing = std::max(standing, borne[f]);
+  }
+  // What the ground does not bear turns the body when a leg is thrown.
+  const double free = std::min(1.0, standing / kGroundShare);
+  for (const Foot f : kFeet) {
+    if (!in_contact[f]) borne[f] = free;
   }
   any_ = false;
   for (const Joint& joint : joints_) {
-    double share = 0;
+    double share = Count(joint.carries) > 0 ? 0.0 : free;
     for (const Foot f : kFeet) {
       if (joint.carries[f]) share = std::max(share, borne[f]);
     }

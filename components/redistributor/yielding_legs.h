@@ -13,10 +13,12 @@ namespace poise {
 /// (53) takes each foot in contact for fixed to the ground. One that a push lifts, kicks away or
 /// leaves without load has nothing to press against, and its torque throws the leg instead. So it
 /// is given in proportion to the most that the foot may bear,
-///   τ = s τ_(53) − (1 − s) d q̇,  s = (F + 2 σ) / (0.6 (F_c − m g / 10)), 0 ≤ s ≤ 1,
+///   τ = s τ_(53) − (1 − s) d q̇,  s = (F + 2 σ) / (0.6 (|F_c| − m g / 10)), 0 ≤ s ≤ 1,
 /// with F and F_c, N, the measured force on the sole, low-passed over 10 ms, and the commanded one,
 /// σ a reading's standard deviation, and d, N·m·s/rad, the inertia of the joint's rotor over 5 ms.
-/// Stiffness and damping that a drive closes get the share s, too.
+/// Stiffness and damping that a drive closes get the share s, too. A leg in the air and the joints
+/// of the upper body have the ground's reaction through the standing legs alone: they get 4 s, at
+/// most 1, of the leg that bears more. Else legs thrown in flight turn the body.
 /// A foot that bears more than 0.6 of its load, or is to bear next to none, changes nothing. Nor
 /// does one that has not borne so much since it landed, when asked for 0.3 of the weight or more:
 /// it may be a millimetre above the ground, which its torque has to find. A leg that yields still
@@ -45,7 +47,7 @@ class YieldingLegs {
   double BorneShare(robot::Foot foot, const robot_state_t& measured,
                     const joint_command_t& command);
 
-  std::vector<Joint> joints_;              // of the legs
+  std::vector<Joint> joints_;
   double load_gain_ = 0;                   // of load_, per tick
   double light_load_ = 0, full_load_ = 0;  // N
   robot::FootArray<double> load_;          // N, measured, low-passed

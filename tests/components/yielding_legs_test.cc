@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <random>
@@ -104,6 +105,34 @@ TEST_F(YieldingLegsTest, LessIsGivenInProportion) {
         left[j] ? 0.25 * command_.torque[j] - 0.75 * Damping(j) * measured_.joint_velocity[j]
                 : command_.torque[j];
     EXPECT_NEAR(torque[j], expected, 1e-6) << j;
+  }
+}
+
+// In flight a leg's torque turns the body.
+TEST_F(YieldingLegsTest, ALegInTheAirYieldsOnceTheGroundBearsNextToNothing) {
+  const std::vector<bool> right = Leg(Foot::kRight);
+  for (const double borne : {0.0, 0.1, 0.25, 1.0}) {
+    Bear(borne * Needed(), 0);
+    const std::vector<double> torque = Yielded({true, false});
+    for (size_t j = 0; j < torque.size(); ++j) {
+      const double share = right[j] ? borne : std::min(1.0, 4 * borne);
+      const double damped = -Damping(j) * measured_.joint_velocity[j];
+      EXPECT_NEAR(torque[j], share * command_.torque[j] + (1 - share) * damped, 1e-5)
+          << j << " of " << borne;  // e^-20 of the load before is left
+    }
+  }
+}
+
+TEST_F(YieldingLegsTest, AFootThatIsToPullYields) {
+  YieldingLegs legs = Standing();
+  joint_command_t command = command_;
+  command.foot_wrench[0].force[2] = kAsked;
+  Bear(0, kAsked);
+  const std::vector<double> torque = Settled(&legs, kBoth, command);
+  const std::vector<bool> right = Leg(Foot::kRight);
+  for (size_t j = 0; j < torque.size(); ++j) {
+    if (!right[j]) continue;
+    EXPECT_NEAR(torque[j], -Damping(j) * measured_.joint_velocity[j], 1e-6) << j;
   }
 }
 
