@@ -46,7 +46,7 @@ class Step {
         nominal_(stance.joint_position) {}
 
   /// s. The other foot leaves as the landed one has half of the load.
-  double both() const { return 0.5 * stepping::Recovery::kLoadTime; }
+  double both() const { return 0.5 * stepping::Recovery::kWalkLoadTime; }
   double single() const {
     return stepping::Recovery::kOmegaStepTime *
                std::sqrt((height_ - spec_.walk_lowering) / robot::kGravity) -
