@@ -16,8 +16,8 @@ constexpr double kFullLoad = 0.3;      // of the weight, asked of a foot: one th
 constexpr double kBounceTime = 10e-3;  // s, of the low-pass on a load: bounces are shorter
 constexpr double kDeviations = 2;      // of the reading, which may show less than the foot bears
 constexpr double kYieldTime = 5e-3;    // s, rotor's inertia over damping
-// Of a standing leg's share, below which what does not stand yields, too: with 1 a bounce would
-// hold up a step.
+// What does not stand yields once a standing leg's share is below this: with 1 a bounce would hold
+// up a step.
 constexpr double kGroundShare = 0.25;
 
 }  // namespace
