@@ -87,7 +87,9 @@ Answer FootholdMargin(const RunRecord& run) {
 }  // namespace
 
 void AddStepping(MetricList* list) {
-  list->Add("steps", "", "feet that left the ground and carried again, in truth", StepCount);
+  list->Add("steps", "",
+            "feet that left the ground and carried elsewhere, or in turn on the spot, in truth",
+            StepCount);
   list->Add("landing_height_max", "mm",
             "true height above or below the other sole at which a foot came down, largest",
             LandingHeight);

@@ -3,6 +3,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <optional>
 
 namespace poise::logging {
@@ -10,7 +12,9 @@ namespace {
 
 constexpr double kUnloadedShare = 0.02;             // of the weight
 constexpr double kLeastSwing = 0.1, kTouch = 0.02;  // s
-constexpr double kHopSwing = 0.5, kHopWay = 0.05;   // s, m
+constexpr double kWay = 0.05;                       // m, to another place
+constexpr size_t kLeastInTurn = 3;                  // steps on the spot
+constexpr double kInTurn = 1;                       // s from a landing to the other foot's leaving
 constexpr double kDownTilt = 1, kDownShare = 0.5;   // rad; of the COM's height at time 0
 constexpr double kLeastHeight = 0.05;               // m, of a COM whose height is known
 
@@ -31,11 +35,10 @@ std::optional<Eigen::Vector2d> Place(const RunRecord& run, size_t foot, int64_t 
   return Eigen::Vector2d(position[0], position[1]);
 }
 
-/// A sole that comes off for a moment and down where it stood, as soft ground lets it.
-bool Hops(const RunRecord& run, const TrueStep& step) {
-  if (step.landed - step.lifted >= Ticks(run, kHopSwing)) return false;
+/// A sole that comes down elsewhere than it stood.
+bool Moves(const RunRecord& run, const TrueStep& step) {
   const auto from = Place(run, step.foot, step.lifted), to = Place(run, step.foot, step.landed);
-  return from && to && (*to - *from).norm() < kHopWay;
+  return !from || !to || (*to - *from).norm() >= kWay;
 }
 
 /// Whether a foot that is off the ground in these intervals carries at a tick.
@@ -135,10 +138,22 @@ std::vector<TrueStep> TrueSteps(const RunRecord& run) {
     }
   }
   std::ranges::stable_sort(steps, {}, &TrueStep::landed);
-  std::vector<TrueStep> made;
+  const auto in_turn = [&](const TrueStep& before, const TrueStep& step) {
+    return before.foot != step.foot && step.lifted - before.landed <= Ticks(run, kInTurn);
+  };
+  // A hop of the foot that has just stepped breaks no turn.
+  std::vector<TrueStep> feet;
   for (const TrueStep& step : steps) {
-    const bool again = !made.empty() && made.back().foot == step.foot;
-    if (!again || !Hops(run, step)) made.push_back(step);
+    const bool again = !feet.empty() && feet.back().foot == step.foot;
+    if (!again || Moves(run, step)) feet.push_back(step);
+  }
+  std::vector<TrueStep> made;
+  for (auto begin = feet.begin(), end = begin; begin != feet.end(); begin = end) {
+    end = std::ranges::adjacent_find(begin, feet.end(), std::not_fn(in_turn));
+    if (end != feet.end()) ++end;
+    const bool walks = static_cast<size_t>(end - begin) >= kLeastInTurn;
+    std::copy_if(begin, end, std::back_inserter(made),
+                 [&](const TrueStep& step) { return walks || Moves(run, step); });
   }
   return made;
 }

@@ -14,8 +14,9 @@ namespace poise::logging {
 /// none without GROUND_TRUTH.
 std::array<std::vector<Interval>, 2> OffTheGround(const RunRecord& run);
 
-/// A foot that left the ground and carries again. A hop is no step: the foot that stepped last
-/// comes off for less than 0.5 s and down within 50 mm of where it stood.
+/// A foot that left the ground and carries again, at least 50 mm from where it stood, or in turn
+/// with the other foot, three times at least, each at most 1 s after the one before: a robot that
+/// rocks, and a sole that soft ground throws off, make no step.
 struct TrueStep {
   size_t foot = 0;
   int64_t lifted = 0, landed = 0;  ///< ticks, of the scenario's time

@@ -49,6 +49,9 @@ class ForeignControllerTest : public RecordTest {
       for (size_t t = 10 + 15 * step; t < 20 + 15 * step; ++t) {
         truth_[t].foot_wrench[1 - step % 2].force[2] = 0;
       }
+      for (size_t t = 20 + 15 * step; t < kTicks; ++t) {
+        truth_[t].foot_pose[1 - step % 2].position[0] = truth_[20 + 15 * step].com_position[0];
+      }
     }
   }
   std::vector<std::string> Missing(const std::string& name) {
@@ -177,7 +180,10 @@ TEST_F(ForeignControllerTest, ARattlingFootMakesNoStep) {
   EXPECT_EQ(Measure("steps"), 0);
   ASSERT_EQ(TrueSupports(Read()).size(), 1u);
   for (size_t t = 34; t < 50; ++t) truth_[t].foot_wrench[0].force[2] = t == 40 ? -kWeight : 0;
-  EXPECT_EQ(Measure("steps"), 1) << "a sole that scrapes for 20 ms is on its way still";
+  ASSERT_EQ(TrueSupports(Read()).size(), 3u) << "a sole that scrapes for 20 ms is on its way still";
+  EXPECT_EQ(Measure("steps"), 0) << "it comes down where it stood";
+  for (size_t t = 50; t < kTicks; ++t) truth_[t].foot_pose[0].position[0] = 0.06;
+  EXPECT_EQ(Measure("steps"), 1);
 }
 
 // On soft ground a sole that has come down comes off once more while it is loaded.
@@ -188,8 +194,22 @@ TEST_F(ForeignControllerTest, AHopOfTheFootThatSteppedIsNoStep) {
   for (size_t t = 22; t < 25; ++t) truth_[t].foot_wrench[1].force[2] = 0;  // 0.12 s
   EXPECT_EQ(Measure("steps"), 5);
   EXPECT_EQ(Measure("walk_way"), way);
-  for (size_t t = 25; t < kTicks; ++t) truth_[t].foot_pose[1].position[0] = 0.06;
+  for (size_t t = 25; t < kTicks; ++t) truth_[t].foot_pose[1].position[0] += 0.06;
   EXPECT_EQ(Measure("steps"), 6) << "it comes down elsewhere";
+}
+
+// A robot that a push rocks from foot to foot, and one that steps on the spot.
+TEST_F(ForeignControllerTest, StepsOnTheSpotAreTakenInTurn) {
+  Walk(0);
+  const double steps = Measure("steps");
+  ASSERT_GE(steps, 3);
+  for (size_t t = 0; t < kTicks; ++t) {
+    for (wrench_t& wrench : truth_[t].foot_wrench) wrench.force[2] = -kWeight;
+    if (t >= 30 && t < 40) truth_[t].foot_wrench[0].force[2] = 0;
+    if (t >= 42 && t < 50) truth_[t].foot_wrench[1].force[2] = 0;
+  }
+  EXPECT_EQ(TrueSupports(Read()).size(), 5u);
+  EXPECT_EQ(Measure("steps"), 0);
 }
 
 // Ahead from 0.4 s on, a turn from 1.2 s on, and a stop once the fifth step has begun, at 1.4 s.
