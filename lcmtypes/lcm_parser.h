@@ -1,7 +1,6 @@
 // Reads the part of the LCM type language that Poise's messages use. Build-time only.
 #pragma once
 
-#include <stdexcept>
 #include <string>
 #include <vector>
 

@@ -1,9 +1,6 @@
 // What the generated message traits share: walks over the fields of a message.
 #pragma once
 
-#include <array>
-#include <bit>
-#include <concepts>
 #include <cstdint>
 #include <cstring>
 #include <iterator>

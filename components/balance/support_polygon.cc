@@ -1,6 +1,5 @@
 #include "components/balance/support_polygon.h"
 
-#include <algorithm>
 #include <array>
 
 namespace poise::balance {

@@ -1,9 +1,7 @@
 // Typed ports: how a component reads and writes messages without seeing the bus.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
-#include <initializer_list>
 #include <span>
 #include <string>
 #include <utility>

@@ -1,6 +1,5 @@
 #include "components/messages/foreign_component.h"
 
-#include <algorithm>
 #include <utility>
 
 #include "components/messages/robot_resource.h"

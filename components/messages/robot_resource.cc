@@ -1,7 +1,5 @@
 #include "components/messages/robot_resource.h"
 
-#include <utility>
-
 #include "components/robot_files/robot_files.h"
 
 namespace poise {

@@ -1,7 +1,6 @@
 #include "components/redistributor/shared_impedance.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace poise {
 namespace {

@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 #include <urdf_model/model.h>
 
-#include <cmath>
-
 #include "components/robot/robot_model.h"
 #include "components/robot/urdf_document.h"
 

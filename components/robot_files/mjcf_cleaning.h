@@ -3,9 +3,7 @@
 #pragma once
 
 #include <array>
-#include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
 #include <vector>

@@ -1,7 +1,6 @@
 #include "components/state_estimator/joint_errors.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "components/state_estimator/square.h"
 

@@ -1,7 +1,6 @@
 #include "components/state_estimator/state_estimator.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "components/balance/gains/gain_rule.h"
 #include "components/framework/run.h"

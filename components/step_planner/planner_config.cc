@@ -4,7 +4,6 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <cmath>
 #include <string>
 
 #include "components/balance/support_polygon.h"

@@ -3,7 +3,6 @@
 
 #include <memory>
 #include <optional>
-#include <vector>
 
 #include "components/balance/capture_point.h"
 #include "components/balance/whole_body.h"

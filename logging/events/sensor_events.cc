@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
 
 #include "fmt/format.h"
 #include "logging/events/event_groups.h"

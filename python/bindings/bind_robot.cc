@@ -1,7 +1,6 @@
 // A robot's dynamics on arrays.
 #include <algorithm>
 #include <limits>
-#include <set>
 
 #include "components/balance/tasks/centroidal_momentum.h"
 #include "components/balance/whole_body.h"

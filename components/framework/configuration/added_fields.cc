@@ -4,8 +4,6 @@
 #include <google/protobuf/io/tokenizer.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 
-#include <memory>
-
 #include "components/framework/configuration/config_error.h"
 #include "fmt/format.h"
 

@@ -1,7 +1,6 @@
 // The components that one process runs, as one: in most processes there is a single one.
 #pragma once
 
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>

@@ -3,7 +3,6 @@
 #include <sys/prctl.h>
 
 #include <csignal>
-#include <cstdio>
 #include <optional>
 
 #include "components/framework/bus/run_socket.h"

@@ -1,8 +1,6 @@
 // main() of every component's program, and of the one that runs several.
 #pragma once
 
-#include <string>
-
 #include "components/framework/component_registry.h"
 
 namespace poise {

@@ -1,7 +1,6 @@
 // StateStore: a component's state after each tick, in memory that outlives its process.
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <span>

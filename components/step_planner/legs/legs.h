@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 
 #include "components/robot/robot_model.h"
 #include "components/step_planner/legs/feet.h"

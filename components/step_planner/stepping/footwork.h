@@ -4,7 +4,6 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <array>
 
 #include "components/framework/state_archive.h"
 #include "components/framework/tick_time.h"

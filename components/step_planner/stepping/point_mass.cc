@@ -1,7 +1,6 @@
 #include "components/step_planner/stepping/point_mass.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "components/robot/posture.h"

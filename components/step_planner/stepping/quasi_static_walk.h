@@ -3,7 +3,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 
 #include "components/framework/state_archive.h"
 #include "components/step_planner/stepping/footsteps.h"

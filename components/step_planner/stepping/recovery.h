@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <array>
 
 #include "components/framework/state_archive.h"
 #include "components/step_planner/stepping/footwork.h"

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 
 #include "components/balance/convex_polygon.h"
 #include "components/framework/state_archive.h"
