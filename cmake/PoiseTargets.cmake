@@ -149,6 +149,21 @@ function(poise_program name)
   set_property(GLOBAL APPEND PROPERTY POISE_PROGRAMS ${name})
 endfunction()
 
+# poise_component_program(name TYPE): the program of one component, whose library is name_component and whose type
+# poise::TYPE() gives.
+function(poise_component_program name type)
+  file(CONFIGURE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/${name}_main.cc CONTENT [[
+#include "components/framework/runners/component_main.h"
+
+namespace poise {
+ComponentType @type@();
+}
+
+int main(int argc, char** argv) { return poise::ComponentMain(argc, argv, poise::@type@()); }
+]] @ONLY)
+  poise_program(${name} SOURCES ${CMAKE_CURRENT_BINARY_DIR}/${name}_main.cc DEPS ${name}_component)
+endfunction()
+
 # poise_embed(FUNCTION file...): FUNCTION.cc, whose function gives the files' bytes.
 function(poise_embed name)
   list(JOIN ARGN "," inputs)

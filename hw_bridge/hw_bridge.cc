@@ -9,7 +9,6 @@
 #include "components/framework/optional_ports.h"
 #include "components/messages/robot_resource.h"
 #include "hw_bridge/drive/units.h"
-#include "hw_bridge/hw_bridge_type.h"
 #include "hw_bridge/robot_thresholds.h"
 
 namespace poise {

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "components/framework/component.h"
+#include "components/framework/component_type.h"
 #include "components/robot/robot_model.h"
 #include "hw_bridge/drive_buses.h"
 #include "hw_bridge/hw_bridge.pb.h"
@@ -77,5 +77,8 @@ class HwBridge : public Component {
   bool reset_before_ = false;  // of the operator's message
   int64_t last_cycle_ = -1;
 };
+
+/// `stop_signal` (may be nullptr): once it is not 0, the bridge stops as on EMERGENCY_STOP.
+ComponentType HwBridgeType(volatile std::sig_atomic_t* stop_signal = nullptr);
 
 }  // namespace poise

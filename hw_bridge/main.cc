@@ -5,7 +5,7 @@
 #include "components/framework/modules.h"
 #include "components/framework/runners/component_main.h"
 #include "components/framework/say_error.h"
-#include "hw_bridge/hw_bridge_type.h"
+#include "hw_bridge/hw_bridge.h"
 
 namespace {
 

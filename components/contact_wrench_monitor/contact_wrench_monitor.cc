@@ -9,7 +9,6 @@
 #include "components/balance/gains/gain_rule.h"
 #include "components/balance/support_polygon.h"
 #include "components/contact_wrench_monitor/contact_wrench_monitor.pb.h"
-#include "components/contact_wrench_monitor/contact_wrench_monitor_type.h"
 #include "components/messages/archive_message.h"
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"

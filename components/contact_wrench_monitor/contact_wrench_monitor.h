@@ -11,7 +11,7 @@
 #include "components/balance/step/step_balance.h"
 #include "components/balance/task_dynamics.h"
 #include "components/balance/whole_body.h"
-#include "components/framework/component.h"
+#include "components/framework/component_type.h"
 #include "components/framework/operator_acts.h"
 #include "components/robot/robot_model.h"
 #include "poise/balance_torque_t.hpp"
@@ -102,5 +102,7 @@ class ContactWrenchMonitor : public Component, public Operated {
   Eigen::VectorXd torque_;
   Eigen::VectorXd foot_wrench_;  // room for both feet
 };
+
+ComponentType ContactWrenchMonitorType();
 
 }  // namespace poise

@@ -31,8 +31,7 @@ PortType Writes(std::string name) {
   return {std::move(name), MessageTraits<T>::kName, false};
 }
 
-/// Each component's folder has a header NAME_type.h with a function that gives its own: programs
-/// and the registry need no more of it, and compile without its class.
+/// Each component's folder has a function that gives its own.
 struct ComponentType {
   std::string name;     ///< of the type, of its program and of its group of fields in a scenario
   std::string summary;  ///< a line for `poise list components`

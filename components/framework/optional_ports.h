@@ -24,7 +24,8 @@ struct OptionalPort {
   bool brings_channel = false;
 };
 
-/// Makes one known, once: NAME_type's function says so beside the ports that its type always has.
+/// Makes one known, once: the function that gives the type says so beside the ports that its type
+/// always has.
 void AddOptionalPort(const OptionalPort& port);
 
 /// The optional ports of a component's type.

@@ -10,7 +10,6 @@
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
 #include "components/redistributor/redistributor.pb.h"
-#include "components/redistributor/redistributor_type.h"
 #include "components/robot/sole.h"
 
 namespace poise {

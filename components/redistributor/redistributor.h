@@ -9,7 +9,7 @@
 #include "components/balance/contact_conditions.h"
 #include "components/balance/distribution_ratio.h"
 #include "components/balance/whole_body.h"
-#include "components/framework/component.h"
+#include "components/framework/component_type.h"
 #include "components/framework/operator_acts.h"
 #include "components/redistributor/internal_feedback.h"
 #include "components/redistributor/ratio_moves.h"
@@ -102,5 +102,7 @@ class Redistributor : public Component, public Operated {
   Eigen::VectorXd peak_torque_;       // k×1, N·m
   Eigen::VectorXd acceleration_;      // n×1
 };
+
+ComponentType RedistributorType();
 
 }  // namespace poise

@@ -7,7 +7,6 @@
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
 #include "components/state_estimator/state_estimator.pb.h"
-#include "components/state_estimator/state_estimator_type.h"
 #include "poise/drive_feedback_t.hpp"
 
 namespace poise {

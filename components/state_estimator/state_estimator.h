@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "components/framework/component.h"
+#include "components/framework/component_type.h"
 #include "components/state_estimator/calibrator.h"
 #include "components/state_estimator/foot_wrenches.h"
 #include "components/state_estimator/invariant_estimator.h"
@@ -35,5 +35,7 @@ class StateEstimator : public Component {
   std::unique_ptr<Calibrator> calibrator_;
   double last_time_ = 0;
 };
+
+ComponentType StateEstimatorType();
 
 }  // namespace poise

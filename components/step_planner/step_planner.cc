@@ -16,7 +16,6 @@
 #include "components/step_planner/planner_config.h"
 #include "components/step_planner/recovery_config.h"
 #include "components/step_planner/status_report.h"
-#include "components/step_planner/step_planner_type.h"
 #include "components/step_planner/support_plan_message.h"
 
 namespace poise {

@@ -6,7 +6,7 @@
 
 #include "components/balance/capture_point.h"
 #include "components/balance/whole_body.h"
-#include "components/framework/component.h"
+#include "components/framework/component_type.h"
 #include "components/framework/operator_acts.h"
 #include "components/framework/tick_time.h"
 #include "components/robot/robot_model.h"
@@ -154,5 +154,7 @@ class StepPlanner : public Component, public Operated {
   // m, sole frames: whole, less what the hip strategy starts from, and what one foot balances on.
   robot::FootArray<balance::ConvexPolygon> sole_, tilt_sole_, stance_sole_;
 };
+
+ComponentType StepPlannerType();
 
 }  // namespace poise

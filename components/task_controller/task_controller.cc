@@ -9,7 +9,6 @@
 #include "components/messages/motion.h"
 #include "components/messages/robot_resource.h"
 #include "components/task_controller/task_controller.pb.h"
-#include "components/task_controller/task_controller_type.h"
 
 namespace poise {
 

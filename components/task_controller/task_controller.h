@@ -7,7 +7,7 @@
 
 #include "components/balance/joint_limits.h"
 #include "components/balance/whole_body.h"
-#include "components/framework/component.h"
+#include "components/framework/component_type.h"
 #include "components/framework/operator_acts.h"
 #include "components/robot/robot_model.h"
 #include "components/task_controller/posture_reference.h"
@@ -80,5 +80,7 @@ class TaskController : public Component, public Operated {
   Eigen::VectorXd posture_acceleration_, posture_torque_;
   Eigen::VectorXd torque_, free_torque_;
 };
+
+ComponentType TaskControllerType();
 
 }  // namespace poise

@@ -8,7 +8,6 @@
 
 #include "components/framework/configuration/suggest.h"
 #include "components/messages/robot_resource.h"
-#include "hw_bridge/drive_emulator/drive_emulator_type.h"
 
 namespace poise {
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "components/framework/component.h"
+#include "components/framework/component_type.h"
 #include "components/robot/robot_model.h"
 #include "hw_bridge/drive_emulator/drive_emulator.pb.h"
 #include "hw_bridge/ethercat/emulator/emulated_chain.h"
@@ -103,5 +103,7 @@ class DriveEmulator final : public Component, private Device {
   int64_t first_tick_time_ = 0;  // ns, of tick 0
   int64_t tick_time_ = 0;        // ns, while ticking
 };
+
+ComponentType DriveEmulatorType();
 
 }  // namespace poise

@@ -6,7 +6,6 @@
 #include "components/framework/clock.h"
 #include "components/messages/robot_resource.h"
 #include "hw_bridge/drive/units.h"
-#include "hw_bridge/unitree_emulator/unitree_emulator_type.h"
 #include "poise/message_traits.hpp"
 
 namespace poise {

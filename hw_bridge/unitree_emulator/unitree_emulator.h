@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "components/framework/component.h"
+#include "components/framework/component_type.h"
 #include "hw_bridge/unitree/dds.h"
 #include "hw_bridge/unitree/motion_switcher.h"
 #include "hw_bridge/unitree_emulator/emulated_robot.h"
@@ -48,5 +48,7 @@ class UnitreeEmulator final : public Component {
   uint32_t cycle_ = 0;   // of the run, from 1
   bool state_sent_ = false;
 };
+
+ComponentType UnitreeEmulatorType();
 
 }  // namespace poise

@@ -9,7 +9,7 @@
 #include "components/framework/optional_ports.h"
 #include "components/messages/robot_resource.h"
 #include "hw_bridge/drive_buses.h"
-#include "hw_bridge/hw_bridge_type.h"
+#include "hw_bridge/hw_bridge.h"
 #include "poise/message_traits.hpp"
 #include "tests/hw_bridge/bridge_bench.h"
 #include "tests/hw_bridge/rope_bus.pb.h"

@@ -1,9 +1,0 @@
-#pragma once
-
-#include "components/framework/component_type.h"
-
-namespace poise {
-
-ComponentType RedistributorType();
-
-}  // namespace poise
