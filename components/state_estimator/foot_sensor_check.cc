@@ -49,7 +49,7 @@ void FootSensorCheck::Read(State said, const Wrench& measured, double dt) {
 
 void FootSensorCheck::Compare(const Wrench& observed, const Covariance& covariance,
                               const Wrench& noise, double least_force, double dt) {
-  if (said_ != State::kOk || !enabled_) return;
+  if (said_ != State::kOk) return;
   Covariance total = covariance;
   total.diagonal() += noise.cwiseAbs2();
   // Samples of what swings to both sides faster than the low-pass follows do not tell its mean: the

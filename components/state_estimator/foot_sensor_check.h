@@ -18,9 +18,6 @@ class FootSensorCheck {
   using Covariance = Eigen::Matrix<double, 6, 6>;
   enum class State : int8_t { kOk, kAbsent, kInvalid, kDead, kFrozen, kBiased };
 
-  /// `enabled`: false: the sensor is believed until it says itself that it is broken.
-  explicit FootSensorCheck(bool enabled) : enabled_(enabled) {}
-
   /// Once a tick, `dt` s after the last: what the sensor says of itself (kOk, kAbsent or kInvalid)
   /// and what it reads.
   void Read(State said, const Wrench& measured, double dt);
@@ -40,7 +37,6 @@ class FootSensorCheck {
   }
 
  private:
-  bool enabled_;
   State state_ = State::kOk, said_ = State::kOk;
   Wrench measured_ = Wrench::Zero();
   LowPass filter_{6, kObserverCutoff};

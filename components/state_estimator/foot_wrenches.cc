@@ -16,12 +16,8 @@ constexpr int kCheckEvery = 4;
 
 }  // namespace
 
-FootWrenches::FootWrenches(std::shared_ptr<const robot::RobotModel> model,
-                           const StateEstimatorConfig& config)
-    : observer_(model),
-      least_force_(kLeastShare * model->total_mass() * robot::kGravity),
-      check_{FootSensorCheck(config.foot_sensor_check().enabled()),
-             FootSensorCheck(config.foot_sensor_check().enabled())} {
+FootWrenches::FootWrenches(std::shared_ptr<const robot::RobotModel> model)
+    : observer_(model), least_force_(kLeastShare * model->total_mass() * robot::kGravity) {
   noise_.head<3>().setConstant(model->force_noise());
   noise_.tail<3>().setConstant(model->moment_noise());
   wrench_.fill(robot::Vector6d::Zero());

@@ -7,7 +7,6 @@
 
 #include "components/framework/state_archive.h"
 #include "components/state_estimator/foot_sensor_check.h"
-#include "components/state_estimator/state_estimator.pb.h"
 #include "components/state_estimator/wrench_observer.h"
 
 namespace poise {
@@ -20,7 +19,7 @@ struct FootReading {
 
 class FootWrenches {
  public:
-  FootWrenches(std::shared_ptr<const robot::RobotModel> model, const StateEstimatorConfig& config);
+  explicit FootWrenches(std::shared_ptr<const robot::RobotModel> model);
 
   /// Once a tick, `dt` s after the last. `correction`: what is known before this tick. Allocates
   /// nothing. Any finite input gives finite wrenches.

@@ -60,7 +60,7 @@ void StateEstimator::Configure(const ComponentContext& context, Wiring* wiring) 
                                          : balance::VelocityCutoff(*model));
   }
   CheckConfig(config, *model);
-  wrenches_ = std::make_unique<FootWrenches>(model, config);
+  wrenches_ = std::make_unique<FootWrenches>(model);
   calibrator_ =
       std::make_unique<Calibrator>(model, config.calibration().enabled(), context.tick_period);
   const MessageCounts counts = JointAndFootCounts(*model);

@@ -34,7 +34,7 @@ TEST(InvariantEstimator, AllocatesNothingPerTick) {
 
 TEST(FootWrenchesAndCalibrator, AllocateNothingPerTick) {
   BaseMotion motion(POISE_SOURCE_DIR + std::string("/deploy/robots/dyros/dyros_legs.pbtxt"));
-  FootWrenches wrenches(motion.model(), {});
+  FootWrenches wrenches(motion.model());
   Calibrator calibrator(motion.model(), true, BaseMotion::kPeriod);
   const Eigen::VectorXd torque = Eigen::VectorXd::LinSpaced(motion.model()->num_joints(), -9, 9);
   for (int i = 0; i < 30; ++i) {

@@ -366,7 +366,7 @@ class FootSensorFault : public testing::TestWithParam<Fault> {};
 // The load moves from foot to foot; from 1 s to 3 s one sensor is broken.
 TEST_P(FootSensorFault, IsNoticedNamedAndForgiven) {
   Motion motion(TestRobot::kDyros, 0);
-  FootWrenches wrenches(motion.model(), {});
+  FootWrenches wrenches(motion.model());
   std::mt19937 random(1);
   std::normal_distribution<double> normal;
   robot::Vector6d first = robot::Vector6d::Zero();
@@ -401,7 +401,7 @@ TEST(FootSensorCheck, ASoleThatRattlesIsNoFault) {
   Motion motion(TestRobot::kDyros, 0);
   const std::array<std::pair<int, int>, 4> rattles = {{{4, 2}, {8, 2}, {16, 4}, {30, 10}}};
   for (const auto& [period, contact] : rattles) {  // ticks
-    FootWrenches wrenches(motion.model(), {});
+    FootWrenches wrenches(motion.model());
     std::mt19937 random(1);
     std::normal_distribution<double> normal;
     const auto update = [&](int tick, bool rattles, double bias) {
@@ -443,7 +443,7 @@ TEST(FootSensorCheck, ASoleThatRattlesIsNoFault) {
 TEST(FootSensorCheck, AReadingThatDoesNotChangeIsFrozenThoughItAgrees) {
   Motion motion(TestRobot::kDyros, 0);
   for (const bool free : {false, true}) {
-    FootWrenches wrenches(motion.model(), {});
+    FootWrenches wrenches(motion.model());
     motion.At(0, free ? 1 : 0.5);
     std::array<FootReading, 2> reading;
     std::mt19937 random(1);
