@@ -11,15 +11,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 const char* KindName(InputKind kind) {
-  switch (kind) {
-    case InputKind::kSameTick:
-      return "same tick";
-    case InputKind::kPreviousTick:
-      return "tick before";
-    case InputKind::kLatest:
-      return "latest";
-  }
-  return "";
+  return kind == InputKind::kSameTick       ? "same tick"
+         : kind == InputKind::kPreviousTick ? "tick before"
+                                            : "latest";
 }
 
 Json Setting(const FieldEntry& field) {

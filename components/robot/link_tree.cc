@@ -11,14 +11,9 @@ namespace {
 constexpr double kMinAxisNorm = 1e-6;
 
 const char* TypeName(JointKind kind) {
-  switch (kind) {
-    case JointKind::kPrismatic:
-      return "prismatic";
-    case JointKind::kFloating:
-      return "floating";
-    default:
-      return "planar or unknown";
-  }
+  return kind == JointKind::kPrismatic  ? "prismatic"
+         : kind == JointKind::kFloating ? "floating"
+                                        : "planar or unknown";
 }
 
 // Returns the child link's pose in the parent link.

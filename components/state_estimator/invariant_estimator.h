@@ -23,6 +23,7 @@
 
 namespace poise {
 
+/// Numbered as CONTACT_* of ESTIMATOR_STATUS.
 enum class FootContact : int8_t { kNone, kFirm, kSlipping };
 
 class InvariantEstimator {

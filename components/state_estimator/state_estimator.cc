@@ -198,17 +198,7 @@ void StateEstimator::PublishBase() {
   }
   for (const Foot f : kFeet) {
     const size_t i = Index(f);
-    switch (base_->contact(f)) {
-      case FootContact::kNone:
-        status.foot_contact[i] = estimator_status_t::CONTACT_NONE;
-        break;
-      case FootContact::kFirm:
-        status.foot_contact[i] = estimator_status_t::CONTACT_FIRM;
-        break;
-      case FootContact::kSlipping:
-        status.foot_contact[i] = estimator_status_t::CONTACT_SLIPPING;
-        break;
-    }
+    status.foot_contact[i] = static_cast<int8_t>(base_->contact(f));
     status.foot_innovation[i] = base_->innovation(f);
     SetPose(base_->foot_pose(f), &status.foot_pose[i]);
   }

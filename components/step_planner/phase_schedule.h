@@ -7,16 +7,19 @@
 #include "components/step_planner/phase_graph.h"
 #include "components/step_planner/step_planner.pb.h"
 #include "components/step_planner/stepping/contact_plan.h"
+#include "poise/planner_status_t.hpp"
 
 namespace poise {
 
 using stepping::TransitionKind;
 
 /// What holds a phase back.
-enum class WaitingFor {
-  kNothing,
-  kCom,      ///< for the capture point above the stance sole, before unloading or lift-off
-  kContact,  ///< of the foot that comes down, before double support
+enum class WaitingFor : int8_t {
+  kNothing = planner_status_t::WAITING_NONE,
+  /// For the capture point above the stance sole, before unloading or lift-off.
+  kCom = planner_status_t::WAITING_COM,
+  /// Of the foot that comes down, before double support.
+  kContact = planner_status_t::WAITING_CONTACT,
 };
 
 /// What the robot says in one tick.

@@ -10,49 +10,18 @@ namespace {
 using robot::Foot;
 using robot::kFeet;
 
-int8_t OutcomeCode(Outcome outcome) {
-  switch (outcome) {
-    case DONE:
-      return planner_status_t::OUTCOME_DONE;
-    case NO_SURFACE:
-      return planner_status_t::OUTCOME_NO_SURFACE;
-    case CONTACT_LOST:
-      return planner_status_t::OUTCOME_CONTACT_LOST;
-    case TIMEOUT:
-      return planner_status_t::OUTCOME_TIMEOUT;
-  }
-  return planner_status_t::OUTCOME_NONE;
-}
-
-int8_t FootCode(Landing::State state) {
-  switch (state) {
-    case Landing::State::kSearching:
-      return planner_status_t::FOOT_SEARCHING;
-    case Landing::State::kTouching:
-      return planner_status_t::FOOT_TOUCHING;
-    case Landing::State::kRetracted:
-      return planner_status_t::FOOT_RETRACTED;
-    case Landing::State::kSwing:
-      break;
-  }
-  return planner_status_t::FOOT_SWING;
-}
+// Both count alike.
+static_assert(DONE == planner_status_t::OUTCOME_DONE &&
+              TIMEOUT == planner_status_t::OUTCOME_TIMEOUT);
 
 int8_t WaitingCode(const SupportView& view) {
-  switch (view.schedule.state().waiting_for) {
-    case WaitingFor::kCom:
-      return planner_status_t::WAITING_COM;
-    case WaitingFor::kContact:
-      for (const Foot f : kFeet) {
-        if (!view.in_contact[f] && view.landing[f].state() == Landing::State::kRetracted) {
-          return planner_status_t::WAITING_NO_SURFACE;
-        }
-      }
-      return planner_status_t::WAITING_CONTACT;
-    case WaitingFor::kNothing:
-      break;
-  }
-  return planner_status_t::WAITING_NONE;
+  const WaitingFor waiting = view.schedule.state().waiting_for;
+  const auto retracted = [&view](Foot f) {
+    return !view.in_contact[f] && view.landing[f].state() == Landing::State::kRetracted;
+  };
+  return waiting == WaitingFor::kContact && std::ranges::any_of(kFeet, retracted)
+             ? planner_status_t::WAITING_NO_SURFACE
+             : static_cast<int8_t>(waiting);
 }
 
 int8_t StageCode(stepping::Stage stage) {
@@ -82,7 +51,8 @@ void ReportPhase(const SupportView& view, double time, planner_status_t* status)
   out.phase_time = time - schedule.phase_start;
   out.next_phase = view.schedule.next();
   out.phase_left = view.held ? -1 : view.schedule.TimeLeft(time);
-  out.began_by = schedule.first ? planner_status_t::OUTCOME_NONE : OutcomeCode(schedule.began_by);
+  out.began_by =
+      schedule.first ? planner_status_t::OUTCOME_NONE : static_cast<int8_t>(schedule.began_by);
   out.waiting_for = view.held ? planner_status_t::WAITING_NONE : WaitingCode(view);
 }
 
@@ -98,9 +68,9 @@ void ReportRobot(const SupportView& view, const robot::RobotData& data, planner_
   for (const Foot f : kFeet) {
     out.next_in_contact[Index(f)] = then[f] ? 1 : 0;
     out.foot_state[Index(f)] =
-        view.in_contact[f]
-            ? planner_status_t::FOOT_SUPPORT
-            : FootCode(view.steps != nullptr ? view.steps->foot_state : view.landing[f].state());
+        view.in_contact[f] ? planner_status_t::FOOT_SUPPORT
+                           : static_cast<int8_t>(view.steps != nullptr ? view.steps->foot_state
+                                                                       : view.landing[f].state());
     SetPose(data.foot_pose[f], &out.foot_pose[Index(f)]);
   }
 }

@@ -314,16 +314,9 @@ stepping::StepInput StepPlanner::MakeStepInput(double time, const robot::FootArr
 }
 
 const stepping::StepOutput* StepPlanner::Steps() const {
-  switch (owner_) {
-    case FeetOwner::kRecovery:
-      return &recovery_.output();
-    case FeetOwner::kWalk:
-      return &walk_.output();
-    case FeetOwner::kPhases:
-    case FeetOwner::kStance:
-      break;
-  }
-  return nullptr;
+  return owner_ == FeetOwner::kRecovery ? &recovery_.output()
+         : owner_ == FeetOwner::kWalk   ? &walk_.output()
+                                        : nullptr;
 }
 
 void StepPlanner::EndSteps(const stepping::StepOutput& steps, double time) {

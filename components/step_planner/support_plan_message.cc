@@ -9,31 +9,19 @@ namespace {
 using robot::Foot;
 using robot::kFeet;
 
-int8_t TransitionCode(TransitionKind kind) {
-  switch (kind) {
-    case TransitionKind::kUnloading:
-      return support_plan_t::TRANSITION_UNLOADING;
-    case TransitionKind::kLoading:
-      return support_plan_t::TRANSITION_LOADING;
-    case TransitionKind::kNone:
-      break;
-  }
-  return support_plan_t::TRANSITION_NONE;
-}
-
 void FillTransition(const SupportView& view, support_plan_t* plan) {
   support_plan_t& out = *plan;
   if (view.held) {
     const stepping::StepOutput* steps = view.steps;
     const TransitionKind kind = steps != nullptr ? steps->transition : TransitionKind::kNone;
     const bool none = kind == TransitionKind::kNone;
-    out.transition = TransitionCode(kind);
+    out.transition = static_cast<int8_t>(kind);
     out.transition_foot = none ? int8_t{-1} : static_cast<int8_t>(steps->foot);
     out.transition_progress = none ? 0 : steps->progress;
     return;
   }
   const ScheduleState& schedule = view.schedule.state();
-  out.transition = TransitionCode(schedule.transition);
+  out.transition = static_cast<int8_t>(schedule.transition);
   out.transition_foot =
       schedule.transition_foot ? static_cast<int8_t>(*schedule.transition_foot) : int8_t{-1};
   out.transition_progress = schedule.progress;

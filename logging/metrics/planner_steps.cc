@@ -1,26 +1,23 @@
 #include "logging/metrics/planner_steps.h"
 
+#include <map>
+
 #include "logging/metrics/analysis.h"
 
 namespace poise::logging {
 
 const char* StepReason(int8_t reason) {
-  switch (reason) {
-    case planner_status_t::REASON_PERSISTENT:
-      return "the capture point stays beyond the soles";
-    case planner_status_t::REASON_OUTSIDE:
-      return "the capture point is farther beyond the soles than balancing brings back";
-    case planner_status_t::REASON_LINGERING:
-      return "the capture point lingers at the soles' edge and comes out";
-    case planner_status_t::REASON_AGAIN:
-      return "the step before did not catch the capture point";
-    case planner_status_t::REASON_WALK:
-      return "the robot walks";
-    case planner_status_t::REASON_TOGETHER:
-      return "the feet are put side by side";
-    default:
-      return "no reason";
-  }
+  using Status = planner_status_t;
+  static const std::map<int8_t, const char*> words = {
+      {Status::REASON_PERSISTENT, "the capture point stays beyond the soles"},
+      {Status::REASON_OUTSIDE,
+       "the capture point is farther beyond the soles than balancing brings back"},
+      {Status::REASON_LINGERING, "the capture point lingers at the soles' edge and comes out"},
+      {Status::REASON_AGAIN, "the step before did not catch the capture point"},
+      {Status::REASON_WALK, "the robot walks"},
+      {Status::REASON_TOGETHER, "the feet are put side by side"}};
+  const auto found = words.find(reason);
+  return found == words.end() ? "no reason" : found->second;
 }
 
 std::vector<PlannerStep> PlannerSteps(const RunRecord& run) {

@@ -9,14 +9,15 @@
 #include "components/messages/motion.h"
 #include "components/messages/quintic_move.h"
 #include "components/messages/touch_load.h"
+#include "poise/planner_status_t.hpp"
 
 namespace poise {
 
 /// How a foot comes down.
 struct LandingSpec {
-  double touch_load = 0;     ///< N on the sole that are contact
-  double release_load = 0;   ///< N below which it is lost again
-  double press_load = 0;     ///< N at which the search comes to a stand, and of a press
+  double touch_load = 0;    ///< N on the sole that are contact
+  double release_load = 0;  ///< N below which it is lost again
+  double press_load = 0;    ///< N at which the search comes to a stand, and of a press
   /// N that an observed load must be above at least to be contact; a third of it in a search.
   double observed_load = 0;
   double touch_duration = kTouchTime;  ///< s that a load must last, or its loss
@@ -78,7 +79,12 @@ class TouchDetector {
 /// where that is negative, no deeper than a search.
 class Landing {
  public:
-  enum class State { kSwing, kSearching, kTouching, kRetracted };
+  enum class State : int8_t {
+    kSwing = planner_status_t::FOOT_SWING,
+    kSearching = planner_status_t::FOOT_SEARCHING,
+    kTouching = planner_status_t::FOOT_TOUCHING,
+    kRetracted = planner_status_t::FOOT_RETRACTED
+  };
 
   explicit Landing(const LandingSpec& spec)
       : spec_(spec), touch_(spec.touch_duration), levels_(spec, 0) {}

@@ -7,6 +7,7 @@
 
 #include "components/framework/state_archive.h"
 #include "components/step_planner/stepping/footsteps.h"
+#include "poise/support_plan_t.hpp"
 
 namespace poise::stepping {
 
@@ -22,7 +23,11 @@ enum class Stage {
 };
 
 /// What happens to a foot's load.
-enum class TransitionKind { kNone, kUnloading, kLoading };
+enum class TransitionKind : int8_t {
+  kNone = support_plan_t::TRANSITION_NONE,
+  kUnloading = support_plan_t::TRANSITION_UNLOADING,
+  kLoading = support_plan_t::TRANSITION_LOADING
+};
 inline TransitionKind TransitionOf(Stage stage) {
   return stage == Stage::kUnloading ? TransitionKind::kUnloading
          : stage == Stage::kLoading ? TransitionKind::kLoading
