@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -62,8 +63,16 @@ struct RobotSource {
   std::vector<SourceLink> links;
   std::vector<SourceJoint> joints;  ///< in order of the text
 
-  SourceLink* FindLink(std::string_view link);
-  SourceJoint* FindJoint(std::string_view joint);
+  /// nullptr where there is none of the name, as below.
+  SourceLink* FindLink(std::string_view link) { return Find(link, &links); }
+  SourceJoint* FindJoint(std::string_view joint) { return Find(joint, &joints); }
+
+ private:
+  template <class Part>
+  static Part* Find(std::string_view name, std::vector<Part>* parts) {
+    const auto found = std::ranges::find(*parts, name, &Part::name);
+    return found == parts->end() ? nullptr : &*found;
+  }
 };
 
 }  // namespace poise::robot

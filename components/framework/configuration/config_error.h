@@ -15,7 +15,10 @@ class ConfigError : public std::runtime_error {
   /// For a value that parses but cannot work. `field` is the dotted path inside the component's own
   /// configuration ("phase[2].duration"); whoever knows the file turns it into file and line
   /// (LocateField).
-  ConfigError(std::string_view field, std::string_view problem);
+  ConfigError(std::string_view field, std::string_view problem)
+      : std::runtime_error(std::string(field).append(": ").append(problem)),
+        field_(field),
+        problem_(problem) {}
   const std::string& field() const { return field_; }
   const std::string& problem() const { return problem_; }
 

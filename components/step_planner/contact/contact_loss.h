@@ -1,6 +1,8 @@
 // A foot that was to carry and carries nothing.
 #pragma once
 
+#include <algorithm>
+
 #include "components/framework/state_archive.h"
 #include "components/framework/tick_time.h"
 
@@ -18,7 +20,10 @@ class ContactLoss {
   /// `time` in s, not decreasing; `load` in N, positive when the sole is pressed.
   /// `deviation`: N, of an observed load, which must be below that instead where it is more; 0 of a
   /// measured one.
-  void Update(double time, double load, bool carries, double deviation = 0);
+  void Update(double time, double load, bool carries, double deviation = 0) {
+    lost_ =
+        empty_.Update(time, carries && load < std::max(release_load_, deviation), kLostDuration);
+  }
   /// From here on anew: another phase, another plan.
   void Reset() {
     empty_.Reset();

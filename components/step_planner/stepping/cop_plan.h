@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 
 #include "components/balance/convex_polygon.h"
+#include "components/balance/minimum_jerk.h"
 #include "components/framework/state_archive.h"
 #include "components/step_planner/stepping/pendulum.h"
 
@@ -26,7 +27,10 @@ struct CaptureMove {
   double duration = 1;                             ///< s
 
   /// At `time`, s, towards `to`, m, world.
-  CaptureReference At(double time, const Eigen::Vector2d& to) const;
+  CaptureReference At(double time, const Eigen::Vector2d& to) const {
+    const balance::MinimumJerk gone(time - start, duration);
+    return {from + gone.position * (to - from), gone.speed * (to - from)};
+  }
   void Archive(StateArchive* archive) { archive->Show(from, start, duration); }
 };
 
@@ -34,8 +38,12 @@ struct CaptureMove {
 /// p = ξ_d − ξ̇_d/ω + (1 + gain)(ξ − ξ_d), or the point of `support` nearest to that. By
 /// ξ̇ = ω (ξ − p) the error then decays at gain ω. `beside`: m, by which the centre of pressure of
 /// the whole robot lies beside it, as the body turns; the sum of both stays within `support`.
-Eigen::Vector2d LeadingCop(const Pendulum& pendulum, const CaptureReference& reference, double gain,
-                           const balance::ConvexPolygon& support,
-                           const Eigen::Vector2d& beside = Eigen::Vector2d::Zero());
+inline Eigen::Vector2d LeadingCop(const Pendulum& pendulum, const CaptureReference& reference,
+                                  double gain, const balance::ConvexPolygon& support,
+                                  const Eigen::Vector2d& beside = Eigen::Vector2d::Zero()) {
+  const Eigen::Vector2d cop =
+      reference.Cop(pendulum.frequency) + (1 + gain) * (pendulum.capture_point() - reference.point);
+  return balance::NearestPoint(support, cop + beside) - beside;
+}
 
 }  // namespace poise::stepping

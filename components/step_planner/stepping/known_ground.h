@@ -15,7 +15,13 @@ class KnownGround {
   void Add(Foot foot, double from, double height) { edge_.push_back({foot, from, height}); }
   bool empty() const { return edge_.empty(); }
   /// m, under the middle of `foot` at x, m; 0 before the first edge.
-  double At(Foot foot, double x) const;
+  double At(Foot foot, double x) const {
+    double height = 0;
+    for (const Edge& edge : edge_) {
+      if (edge.foot == foot && x >= edge.from) height = edge.height;
+    }
+    return height;
+  }
 
  private:
   struct Edge {
