@@ -3,6 +3,9 @@
 
 #include <Eigen/Geometry>
 
+#include "components/balance/capture_point.h"
+#include "components/balance/convex_polygon.h"
+#include "components/framework/tick_time.h"
 #include "components/robot/dynamics.h"
 #include "components/step_planner/stepping/footwork.h"
 #include "components/step_planner/support_plan_message.h"
@@ -21,5 +24,11 @@ void ReportRobot(const SupportView& view, const robot::RobotData& data, planner_
 void ReportStepping(const stepping::StepStatus& own, const stepping::WalkCommand& command,
                     double time, const robot::FootArray<Eigen::Isometry3d>& sole,
                     planner_status_t* status);
+
+/// Whether the capture point has left what the soles can stop, and the step that it then asks for;
+/// `soles` in `frame_o`, at least a corner.
+void MonitorCapture(double time, const Eigen::Isometry3d& frame_o,
+                    const balance::ConvexPolygon& soles, const balance::CapturePoint& pendulum,
+                    HeldCondition* step_needed, planner_status_t* status);
 
 }  // namespace poise

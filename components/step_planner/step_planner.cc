@@ -12,7 +12,6 @@
 #include "components/messages/motion.h"
 #include "components/messages/robot_resource.h"
 #include "components/robot/sole.h"
-#include "components/step_planner/capture_monitor.h"
 #include "components/step_planner/planner_config.h"
 #include "components/step_planner/recovery_config.h"
 #include "components/step_planner/status_report.h"
