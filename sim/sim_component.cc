@@ -19,25 +19,27 @@ constexpr int64_t kLongestPush = int64_t{1} << 40;  // ticks
 
 }  // namespace
 
-ComponentTraits SimTraits(const std::string& engine) {
-  return {.sections = {"sim", engine},
-          .engine = engine,
-          .ideal = {"sim.joint_friction=false", "sim.sensor_noise=false", "sim.rotor_inertia=true",
-                    "sim.push_sensor_noise=0", "sim.robot_drive_train=false",
-                    "sim.drive_train=", "sim.model_error=", "sim.motor_change="},
-          // Until the controller follows, the robot hangs.
-          .realtime = {{"sim.crane", "sim.crane.release_time=1"}},
-          // In lockstep no command is late.
-          .lockstep = {"sim.crane="}};
-}
-
-std::vector<PortType> SimPorts() {
-  return {Reads<drive_command_t>("drive_command", InputKind::kPreviousTick),
-          Reads<bridge_status_t>("bridge_status", InputKind::kPreviousTick),
-          Reads<operate::act_t>("operator", InputKind::kLatest),
-          Writes<drive_feedback_t>("drive_feedback"),
-          Writes<external_push_t>("external_push"),
-          Writes<ground_truth_t>("ground_truth")};
+ComponentType SimType(const std::string& engine, std::string summary, SimReader read,
+                      const google::protobuf::Descriptor* config, std::string_view (*schema)()) {
+  return {"sim_" + engine,
+          std::move(summary),
+          [read = std::move(read)] { return std::make_unique<SimComponent>(read); },
+          {.sections = {"sim", engine},
+           .engine = engine,
+           .ideal = {"sim.joint_friction=false", "sim.sensor_noise=false", "sim.rotor_inertia=true",
+                     "sim.push_sensor_noise=0", "sim.robot_drive_train=false",
+                     "sim.drive_train=", "sim.model_error=", "sim.motor_change="},
+           // Until the controller follows, the robot hangs.
+           .realtime = {{"sim.crane", "sim.crane.release_time=1"}},
+           // In lockstep no command is late.
+           .lockstep = {"sim.crane="}},
+          {Reads<drive_command_t>("drive_command", InputKind::kPreviousTick),
+           Reads<bridge_status_t>("bridge_status", InputKind::kPreviousTick),
+           Reads<operate::act_t>("operator", InputKind::kLatest),
+           Writes<drive_feedback_t>("drive_feedback"), Writes<external_push_t>("external_push"),
+           Writes<ground_truth_t>("ground_truth")},
+          config,
+          schema};
 }
 
 SimComponent::SimComponent(SimReader read) : read_(std::move(read)) {}

@@ -7,8 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "components/framework/component.h"
-#include "components/framework/component_traits.h"
 #include "components/framework/component_type.h"
 #include "components/framework/operator_acts.h"
 #include "poise/bridge_status_t.hpp"
@@ -32,11 +30,10 @@ struct SimSetup {
 /// Reads the configuration of an engine's process. Throws ConfigError.
 using SimReader = std::function<SimSetup(const ComponentContext&)>;
 
-/// Describes the process of `engine`: it takes the scenario's `sim` and the field of the engine's
-/// name.
-ComponentTraits SimTraits(const std::string& engine);
-/// Whatever the engine.
-std::vector<PortType> SimPorts();
+/// The type of the process of `engine`: it takes the scenario's `sim` and the field of the engine's
+/// name. The others: as in ComponentType.
+ComponentType SimType(const std::string& engine, std::string summary, SimReader read,
+                      const google::protobuf::Descriptor* config, std::string_view (*schema)());
 
 /// drive_command and bridge_status of tick t - 1 -> one control period of simulation ->
 /// drive_feedback, external_push and ground_truth of tick t. The crane, if there is one, lets go

@@ -21,13 +21,8 @@ SimSetup ReadSetup(const ComponentContext& context) {
 }  // namespace
 
 ComponentType SimMujocoType() {
-  return {"sim_mujoco",
-          "the robot, the ground and the pushes, simulated in MuJoCo",
-          [] { return std::make_unique<SimComponent>(ReadSetup); },
-          SimTraits("mujoco"),
-          SimPorts(),
-          SimMujocoConfig::descriptor(),
-          sim_mujoco_proto_schema};
+  return SimType("mujoco", "the robot, the ground and the pushes, simulated in MuJoCo", ReadSetup,
+                 SimMujocoConfig::descriptor(), sim_mujoco_proto_schema);
 }
 
 }  // namespace poise

@@ -21,13 +21,8 @@ SimSetup ReadSetup(const ComponentContext& context) {
 }  // namespace
 
 ComponentType SimOdeType() {
-  return {"sim_ode",
-          "the robot, the ground and the pushes, simulated in ODE",
-          [] { return std::make_unique<SimComponent>(ReadSetup); },
-          SimTraits("ode"),
-          SimPorts(),
-          SimOdeConfig::descriptor(),
-          sim_ode_proto_schema};
+  return SimType("ode", "the robot, the ground and the pushes, simulated in ODE", ReadSetup,
+                 SimOdeConfig::descriptor(), sim_ode_proto_schema);
 }
 
 }  // namespace poise
