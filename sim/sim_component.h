@@ -40,14 +40,13 @@ ComponentType SimType(const std::string& engine, std::string summary, SimReader 
 /// when bridge_status says that the bridge follows. Tick 0 reports the start posture at rest
 /// without stepping. Finishes, as failed, when the robot falls. A ConfigError's path begins with
 /// "sim.": the configuration of an engine's process has a field `sim` (SimConfig) beside its own.
-class SimComponent : public Component, public Operated {
+class SimComponent : public Component {
  public:
   explicit SimComponent(SimReader read);
   ~SimComponent() override;  // defined in the .cc: each engine would compile the ports anew
   void Configure(const ComponentContext& context, Wiring* wiring) override;
   std::string_view finished() const override;
   bool failed() const override { return !finished().empty(); }
-  const LiveSettings& live_settings() const override { return operator_.settings(); }
   /// For who runs the component in its own process; nullptr before Configure.
   Simulation* simulation() { return simulation_.get(); }
 

@@ -122,7 +122,7 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
   wiring->AddStage("prepare", {&robot_state_}, {}, [this](const Tick&) { Prepare(); });
   wiring->AddStage("balance", {&robot_state_, &support_plan_, &task_torque_, &operator_},
                    {&balance_torque_}, [this](const Tick& tick) {
-                     TakeActs(tick);
+                     operator_.TakeSettings(tick);
                      Balance();
                    });
   SetPose(Eigen::Isometry3d::Identity(), &balance_torque_->frame_o);
@@ -139,11 +139,6 @@ void ContactWrenchMonitor::AddSettings(double tick_period) {
     add("single_support.half_length", &single_support_.half_length);
     add("single_support.half_width", &single_support_.half_width);
   }
-}
-
-void ContactWrenchMonitor::TakeActs(const Tick& tick) {
-  while (operator_.Next(tick) != nullptr) operator_.Answer(operate::answer_t::VERDICT_UNKNOWN);
-  operator_.settings().Advance(tick.index);
 }
 
 bool ContactWrenchMonitor::Archive(StateArchive* archive) {

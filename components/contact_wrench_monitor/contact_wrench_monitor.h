@@ -25,15 +25,13 @@ namespace poise {
 /// height. When the task torque is held from an earlier tick, or the dynamics do not exist, it is
 /// passed on without a balancing part and the status says so; the contact quantities are then those
 /// of the last good tick.
-class ContactWrenchMonitor : public Component, public Operated {
+class ContactWrenchMonitor : public Component {
  public:
   void Configure(const ComponentContext& context, Wiring* wiring) override;
   bool Archive(StateArchive* archive) override;
-  const LiveSettings& live_settings() const override { return operator_.settings(); }
 
  private:
   void AddSettings(double tick_period);
-  void TakeActs(const Tick& tick);
   void Prepare();
   void Balance();
   /// Dynamics and protected task for these contacts; STATUS_*.

@@ -97,6 +97,11 @@ const act_t* ActInput::Next(const Tick& tick) {
   return nullptr;
 }
 
+void ActInput::TakeSettings(const Tick& tick) {
+  while (Next(tick) != nullptr) Answer(answer_t::VERDICT_UNKNOWN);
+  settings_.Advance(tick.index);
+}
+
 void ActInput::Offer(const act_t& act) {
   if (act.component != component_) return;
   if (act.kind == act_t::KIND_ASK) {
@@ -158,6 +163,13 @@ int ActInput::encoded_size() const { return act_t{}.getEncodedSize(); }
 bool ActInput::Decode(const uint8_t* data, int size, void* message) const {
   auto& act = *static_cast<act_t*>(message);
   return act.decode(data, 0, size) == size && ActTraits::AllFinite(act);
+}
+
+std::span<const LiveSetting> LiveSettingsOf(const Wiring& wiring) {
+  for (const InputPort* const port : wiring.inputs()) {
+    if (const auto* acts = dynamic_cast<const ActInput*>(port)) return acts->settings().all();
+  }
+  return {};
 }
 
 }  // namespace poise

@@ -60,6 +60,8 @@ class ActInput final : public InputPort {
   const operate::act_t* Next(const Tick& tick);
   /// Says what became of the act that Next gave; without this call it is DONE.
   void Answer(int8_t verdict) { verdict_ = verdict; }
+  /// Next of a component that knows settings alone: refuses all else, and goes on with the values.
+  void TakeSettings(const Tick& tick);
   LiveSettings& settings() { return settings_; }
   const LiveSettings& settings() const { return settings_; }
   void Archive(StateArchive* archive) { settings_.Archive(archive); }
@@ -108,11 +110,7 @@ class ActInput final : public InputPort {
   size_t next_said_ = 0;
 };
 
-/// A component with an ActInput shows it to tools by this.
-class Operated {
- public:
-  virtual ~Operated() = default;
-  virtual const LiveSettings& live_settings() const = 0;
-};
+/// Those of the component with these ports; none where no operator acts on it.
+std::span<const LiveSetting> LiveSettingsOf(const Wiring& wiring);
 
 }  // namespace poise

@@ -89,7 +89,7 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   wiring->AddStage("prepare", {&robot_state_}, {}, [this](const Tick&) { Prepare(); });
   wiring->AddStage("redistribute", {&robot_state_, &support_plan_, &balance_torque_, &operator_},
                    {&joint_command_}, [this](const Tick& tick) {
-                     TakeActs(tick);
+                     operator_.TakeSettings(tick);
                      Redistribute(tick);
                    });
 }
@@ -101,11 +101,6 @@ void Redistributor::AddSettings(double tick_period) {
   settings.Add("landed_share", &landed_share_, 0, kMostLightShare, kRatioRamp);
   if (!feedback_.enabled()) return;
   settings.Add("feedback.integral", feedback_.integral_rate(), 0, kMostIntegral, kRatioRamp);
-}
-
-void Redistributor::TakeActs(const Tick& tick) {
-  while (operator_.Next(tick) != nullptr) operator_.Answer(operate::answer_t::VERDICT_UNKNOWN);
-  operator_.settings().Advance(tick.index);
 }
 
 bool Redistributor::Archive(StateArchive* archive) {

@@ -29,17 +29,15 @@ namespace poise {
 /// command is sent again; when there is a fresh torque but no resultant, that torque
 /// passes through undistributed, with the same status. The hardware bridge refuses either as stale:
 /// it holds its last accepted command for a few cycles, then damps the joints, then stops.
-class Redistributor : public Component, public Operated {
+class Redistributor : public Component {
  public:
   void Configure(const ComponentContext& context, Wiring* wiring) override;
   bool Archive(StateArchive* archive) override;
-  const LiveSettings& live_settings() const override { return operator_.settings(); }
 
  private:
   using Wrenches = robot::FootArray<balance::Vector6d>;
 
   void AddSettings(double tick_period);
-  void TakeActs(const Tick& tick);
   void Prepare();
   void Redistribute(const Tick& tick);
   int8_t ComputeDouble(const Tick& tick);

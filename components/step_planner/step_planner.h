@@ -46,11 +46,10 @@ enum class FeetOwner : int8_t {
 
 /// ROBOT_STATE -> SUPPORT_PLAN, PLANNER_STATUS, and FOOTSTEPS where it makes steps. When a state is
 /// invalid plan and report of the last good tick are sent again, the plan with the status set.
-class StepPlanner : public Component, public Operated {
+class StepPlanner : public Component {
  public:
   void Configure(const ComponentContext& context, Wiring* wiring) override;
   bool Archive(StateArchive* archive) override;
-  const LiveSettings& live_settings() const override { return operator_.settings(); }
 
  private:
   /// Where the COM can be brought to rest, seen from the soles in contact.

@@ -22,11 +22,10 @@ namespace poise {
 /// ROBOT_STATE, SUPPORT_PLAN -> TASK_TORQUE. When state or plan are invalid or the dynamics are
 /// singular the message of the last good tick is sent again with the status set: its torque is what
 /// held the robot a moment ago, and no better one is known.
-class TaskController : public Component, public Operated {
+class TaskController : public Component {
  public:
   void Configure(const ComponentContext& context, Wiring* wiring) override;
   bool Archive(StateArchive* archive) override;
-  const LiveSettings& live_settings() const override { return operator_.settings(); }
 
  private:
   void AddSettings(double tick_period);

@@ -73,14 +73,12 @@ std::vector<LiveField> LiveFields(const RunSpec& spec) {
     if (std::ranges::none_of(type->ports, is_acts) || ActChannel(spec.graph(), i).empty()) continue;
     SharedObjects shared;
     const ConfiguredComponent configured = ConfigureComponent(spec, i, type->make, &shared);
-    const auto* const operated = dynamic_cast<const Operated*>(configured.component.get());
-    if (operated == nullptr) continue;
     std::vector<FieldEntry> entries;
     if (type->schema != nullptr && type->config != nullptr) {
       AddSchema(type->schema());
       entries = FieldsOfType(std::string(type->config->full_name()));
     }
-    for (const LiveSetting& setting : operated->live_settings().all()) {
+    for (const LiveSetting& setting : LiveSettingsOf(configured.wiring)) {
       LiveField field;
       field.component = i;
       field.path = instance.name() + "." + setting.field;

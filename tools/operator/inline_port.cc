@@ -80,11 +80,9 @@ void InlinePort::Update(int) {
 std::map<std::string, double> InlinePort::InForce() const {
   std::map<std::string, double> in_force;
   for (const LiveField& field : fields()) {
-    const auto& component = *runner_->graph().component(field.component).component;
-    const auto* const operated = dynamic_cast<const Operated*>(&component);
-    if (operated == nullptr) continue;
+    const Wiring& wiring = runner_->graph().component(field.component).wiring;
     const std::string name = field.path.substr(field.path.find('.') + 1);
-    for (const LiveSetting& setting : operated->live_settings().all()) {
+    for (const LiveSetting& setting : LiveSettingsOf(wiring)) {
       if (setting.field == name) {
         in_force[field.path] = setting.ticks > 0 ? setting.to : *setting.value;
       }
