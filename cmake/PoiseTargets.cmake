@@ -103,9 +103,16 @@ function(poise_compile_as_library name)
   target_compile_options(${name} PRIVATE -fPIC)
 endfunction()
 
-# poise_library(name SOURCES ... DEPS ... [UNITE]): a static library of our own code; UNITE: see poise_unite.
+# poise_library(name [SOURCES ...] [FOLDERS ...] [EXCEPT ...] DEPS ... [UNITE]): a static library of our own code; UNITE: see
+# poise_unite. Without SOURCES it is made of all in the calling folder and in FOLDERS below it, but for EXCEPT.
 function(poise_library name)
-  cmake_parse_arguments(A "UNITE" "" "SOURCES;DEPS" ${ARGN})
+  cmake_parse_arguments(A "UNITE" "" "SOURCES;FOLDERS;EXCEPT;DEPS" ${ARGN})
+  if(NOT A_SOURCES)
+    list(TRANSFORM A_FOLDERS APPEND /*.cc)
+    file(GLOB A_SOURCES CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} *.cc ${A_FOLDERS})
+    list(REMOVE_ITEM A_SOURCES "" ${A_EXCEPT})
+    list(SORT A_SOURCES COMPARE FILE_BASENAME)  # which files are compiled together depends on nothing but their names
+  endif()
   add_library(${name} STATIC ${A_SOURCES})
   target_link_libraries(${name} PUBLIC poise_options ${A_DEPS})
   if(A_UNITE)
