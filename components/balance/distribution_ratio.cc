@@ -1,6 +1,7 @@
 #include "components/balance/distribution_ratio.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace poise::balance {

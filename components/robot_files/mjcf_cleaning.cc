@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cstdlib>
 #include <functional>
+#include <map>
+#include <set>
 
 #include "components/robot/robot_model.h"
 #include "components/robot/xml_text.h"

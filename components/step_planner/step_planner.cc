@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "components/balance/support_polygon.h"
 #include "components/framework/optional_ports.h"

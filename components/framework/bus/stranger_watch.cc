@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <span>
 
 #include "components/framework/run.h"
 #include "fmt/format.h"

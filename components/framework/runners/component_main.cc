@@ -4,6 +4,7 @@
 
 #include <csignal>
 #include <optional>
+#include <string>
 
 #include "components/framework/bus/run_socket.h"
 #include "components/framework/component_description.h"

@@ -1,6 +1,7 @@
 #include "components/step_planner/stepping/quasi_static_walk.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
