@@ -26,7 +26,6 @@ constexpr double kPositionMargin = 0.05;  // rad beyond a joint's limit at which
 // s in which the tilt's gyro is corrected by the accelerometer: pushes are shorter.
 constexpr double kTiltTime = 1;
 
-/// By Refusal.
 constexpr int8_t kReasons[kNumRefusals] = {
     Status::REASON_NONE,          Status::REASON_COMMAND_RUN,
     Status::REASON_COMMAND_SIZE,  Status::REASON_COMMAND_SEQUENCE,

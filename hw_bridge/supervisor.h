@@ -75,7 +75,6 @@ class Supervisor {
 
   int8_t state() const { return state_; }
   int8_t reason() const { return reason_; }
-  /// Latched, and the ramp is over.
   bool at_rest() const { return latched() && ramp_left_ == 0; }
   /// rad/s, filtered, from the encoder counts.
   const std::vector<double>& joint_velocity() const { return monitor_.velocity(); }

@@ -24,7 +24,6 @@ struct ChannelCompleteness {
   int64_t other_type = 0;    ///< of the refused: another type's, or another version's of the type
 };
 
-/// First and last tick of a gap.
 struct TickRange {
   int64_t first = 0;
   int64_t last = 0;

@@ -25,7 +25,6 @@ struct JointRow {
   double torque = 0;    ///< N·m, beside it
 };
 
-/// What one point of contact is made of.
 struct ContactMaterial {
   double friction = 0;  ///< Coulomb coefficient
   /// N/m and N·s/m of this point alone, along the normal. Stiffness 0: rigid ground, as hard as the

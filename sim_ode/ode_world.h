@@ -56,7 +56,6 @@ class OdeWorld : public World {
   Eigen::Vector3d contact_force(int index) const override;
   Eigen::Vector3d contact_moment(int index) const override;
 
-  /// Steps that TreeStep gave up.
   int64_t given_up_steps() const { return given_up_steps_; }
   /// Times that the last step set the bounds of friction (TreeStep); 0 without contacts.
   int friction_rounds() const { return tree_.friction_rounds(); }

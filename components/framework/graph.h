@@ -75,7 +75,6 @@ void FillPlan(const GraphPlan& plan, Graph* graph);
 /// Holds the run's own numbers to their rules. Throws ConfigError, with `prefix` before the field.
 void CheckRun(const RunSpec& spec, const std::string& prefix = "run: ");
 
-/// One configured component of a run.
 struct ConfiguredComponent {
   int index = -1;  ///< in the graph
   std::string name;

@@ -28,7 +28,6 @@ struct OptionalPort {
 /// always has.
 void AddOptionalPort(const OptionalPort& port);
 
-/// The optional ports of a component's type.
 std::vector<OptionalPort> OptionalPortsOf(const std::string& component);
 
 /// "where hw_bridge.ethercat or hw_bridge.unitree is set", for a person.

@@ -15,7 +15,6 @@ inline constexpr std::array<Foot, 2> kFeet{Foot::kRight, Foot::kLeft};
 constexpr Foot Other(Foot foot) { return foot == Foot::kRight ? Foot::kLeft : Foot::kRight; }
 /// Place in a list of the robot's feet.
 constexpr size_t Index(Foot foot) { return static_cast<size_t>(foot); }
-/// The foot at that place.
 constexpr Foot FootAt(int place) { return static_cast<Foot>(place); }
 /// Sign of the foot's own side along y: 1 left, −1 right.
 constexpr double Side(Foot foot) { return foot == Foot::kLeft ? 1 : -1; }

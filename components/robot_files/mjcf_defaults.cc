@@ -58,7 +58,6 @@ std::string MjcfDefaults::ClassAttribute(const tinyxml2::XMLElement& element,
                         : fmt::format(" {}='c{}'", name, known->second);
 }
 
-// The class whose defaults an element takes.
 std::string MjcfDefaults::ClassOf(const tinyxml2::XMLElement& element,
                                   const std::string& child_class) const {
   const std::string own = Attribute(element, "class");

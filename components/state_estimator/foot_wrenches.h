@@ -11,7 +11,6 @@
 
 namespace poise {
 
-/// What one foot's sensor says.
 struct FootReading {
   FootSensorCheck::State state = FootSensorCheck::State::kOk;  ///< as it says itself
   robot::Vector6d wrench = robot::Vector6d::Zero();            ///< robot on environment, sole frame

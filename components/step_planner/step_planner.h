@@ -70,7 +70,6 @@ class StepPlanner : public Component {
   int NumSteps() const { return walks_dynamically_ ? recovery_.num_begun() : walk_.num_landed(); }
   /// STATUS_* of the plan.
   int8_t Plan(double time);
-  /// What the robot says to the schedule.
   ScheduleInput Observe(double time, const robot::FootArray<double>& load);
   /// N, standard deviation of an observed load; 0 of a measured one.
   double LoadDeviation(robot::Foot foot) const;

@@ -49,7 +49,6 @@ balance::TaskGains GainsOf(const balance::TargetParts& needed, TaskConfig::Refer
   return gains.foot;
 }
 
-/// Parts of a target that a reference of the plan has.
 balance::TargetParts PartsOf(TaskConfig::Reference reference) {
   switch (reference) {
     case TaskConfig::COM:

@@ -17,7 +17,6 @@
 
 namespace poise {
 
-/// Which feet are in contact.
 using FeetInContact = robot::FootArray<bool>;
 
 /// Gains at `field` of the configuration. Throws ConfigError for what is no positive number, and,
@@ -89,7 +88,6 @@ class TaskList {
   const balance::TaskTarget& Target(const Entry& entry) const;
   /// Moves a row to another place; those in between close up.
   void MoveRow(Eigen::Index from, Eigen::Index to);
-  /// The knee of `foot` is one of `forced`.
   bool KneeStops(robot::Foot foot, std::span<const ForcedJoint> forced) const {
     return std::ranges::any_of(forced, [&](const auto& j) { return j.joint == knee_[foot]; });
   }

@@ -30,7 +30,6 @@ uint32_t Between(const SlavePorts& slave, int from, int to) {
   return slave.times[static_cast<size_t>(to)] - slave.times[static_cast<size_t>(from)];
 }
 
-/// The active port before `port` in the order of the frame.
 int PortBefore(const SlavePorts& slave, int port) {
   const std::vector<int> ports = ActivePorts(slave);
   const auto at = std::find(ports.begin(), ports.end(), port);

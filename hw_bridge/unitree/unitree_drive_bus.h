@@ -40,7 +40,6 @@ class UnitreeDriveBus final : public DriveBus {
   const drive_feedback_t* Receive() override;
   void Send(const drive_command_t& command) override { SendMotors(&command); }
   bool impedance() const override { return true; }
-  /// The robot has an IMU; its feet have no sensors.
   SensorsOfBus sensors() const override { return {.imu = true, .feet = true, .velocity = true}; }
   std::span<const DriveReport> reports() const override { return reports_; }
   const BusHealth& health() const override { return health_; }

@@ -59,7 +59,6 @@ class RowFiller : public ScalarVisitor {
   size_t next_ = 0;
 };
 
-/// A channel as it is read.
 struct ChannelRead {
   std::string name;
   const MessageType* type;
@@ -87,7 +86,6 @@ std::optional<int64_t> TickOf(const RunRecord& run, const ChannelRead& channel, 
       std::llround(static_cast<double>(event.utime) * 1e-6 / run.spec.tick_period()));
 }
 
-/// The channels that have messages in `rows`.
 std::vector<ChannelRead> ReadChannels(const std::string& path, const RunRecord& run,
                                       const PageRows& rows) {
   std::vector<ChannelRead> channels;

@@ -83,7 +83,6 @@ void AddDrives(MetricList* list) {
               const auto deviation = LeastDeviation(run);
               return deviation ? Answer(deviation->delay) : Answer();
             });
-  // A counter of the bridge at the end of the run.
   const auto add = [&](const char* name, const char* text, int64_t bridge_status_t::*counter) {
     list->Add(name, "", text, [counter](const RunRecord& run) -> Answer {
       for (int64_t tick = run.num_ticks - 1; tick >= run.first_tick; --tick) {

@@ -31,7 +31,6 @@ class InlineRecorder {
   /// A caller that sets a tap of its own afterwards calls this in it.
   void Add(int channel, const OutputPort& output, const Tick& tick);
 
-  /// A message of an external channel; the constructor has the runner call it.
   void AddExternal(int channel, std::span<const uint8_t> data) {
     writer_.AddMessage(channel, -1, data);
   }

@@ -9,7 +9,6 @@
 
 namespace poise::logging {
 
-/// A message of an external channel.
 struct ExternalMessage {
   int64_t tick = 0;      ///< from which on its reader is shown it; at first that of the recording
   bool certain = false;  ///< the log tells that tick, or it makes no difference

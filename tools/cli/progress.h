@@ -51,7 +51,6 @@ class StageLine {
   std::jthread thread_;
 };
 
-/// A run's progress.
 class Progress {
  public:
   /// `duration`: s of the scenario; `lead`: s before it. Quiet: shows nothing.

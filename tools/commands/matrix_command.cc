@@ -43,7 +43,6 @@ struct MatrixOptions {
   int jobs = 1;
 };
 
-/// A cell and how it is run.
 struct Job {
   MatrixCell cell;
   std::vector<std::string> arguments;  ///< of `poise run`, the folder aside

@@ -54,7 +54,6 @@ OperatorAct ActOf(ActKind kind, const std::string& name = {}) {
   return act;
 }
 
-/// The run that is acted on.
 struct ActedRun {
   std::filesystem::path dir;
   std::unique_ptr<BusPort> port;

@@ -51,7 +51,6 @@ std::string ActChannel(const Graph& graph, int component) {
 
 std::string FieldName(const std::string& path) { return path.substr(path.find('.') + 1); }
 
-/// The index of a name.
 int IndexOf(const std::vector<std::string>& names, const std::string& name, const char* what) {
   const auto found = std::ranges::find(names, name);
   if (found == names.end()) {

@@ -75,7 +75,6 @@ bool LacksFigure(const std::vector<const MatrixCell*>& cells) {
   });
 }
 
-/// The cells of one scenario.
 std::string FormatScenario(const std::vector<const MatrixCell*>& cells) {
   std::vector<TableRow> rows = {{"what", "paper"}, {"outcome", ""}};
   const std::vector<const CheckResult*> figures = PaperFigures(cells);

@@ -106,7 +106,6 @@ struct RunSummary {
 /// The checks of a summary.json. Throws std::exception when it is none.
 std::vector<CheckResult> ChecksOf(const nlohmann::json& summary);
 
-/// All that summary.json says.
 std::string SummaryJson(const Scenario& scenario, const logging::RunRecord& run,
                         const RunSummary& summary);
 

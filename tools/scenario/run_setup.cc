@@ -211,7 +211,6 @@ void CheckEngineOf(const std::vector<std::string>& changes, const Graph& graph) 
   }
 }
 
-/// Puts components of `graph` into the process of that name.
 void PutInto(const std::string& process, const std::vector<std::string>& components,
              const std::string& flag, Graph* graph) {
   const std::vector<std::string> names = NamesOf(graph->component());

@@ -33,7 +33,6 @@ class ScenarioFiles {
   /// removes left out. `base` and `remove` are gone. Throws ConfigError "file:line: remove[i]:
   /// problem": the base does not set it.
   Scenario Merged() const;
-  /// File of the scenario itself.
   const std::string& file() const { return files_[own_].name; }
   /// The place of `field`, a path in the merged scenario, or of the nearest enclosing field that
   /// any file sets; of several files, of the one that counts. `line` 0 and the scenario's own file

@@ -40,7 +40,6 @@ std::string NameProblem(const std::string& name) {
 
 std::string VariantLabel(const Variant& variant) { return "variant " + variant.name(); }
 
-/// The path as it was written.
 std::string WrittenPath(const FieldChange& change) {
   return change.set.substr(0, change.set.find('='));
 }
@@ -220,7 +219,6 @@ void CheckReference(const LoadedScenario& loaded) {
   }
 }
 
-/// Checks the variants' names, and that of the reference.
 void CheckVariants(const LoadedScenario& loaded) {
   const std::vector<std::string> names = NamesOf(loaded.scenario.variant());
   std::set<std::string> taken;

@@ -44,7 +44,6 @@ void AddSweepOptions(CLI::App* app, SweepOptions* options);
 void AddChangeOptions(CLI::App* app, RunChanges* changes, const std::string& set);
 /// Adds --world; `default_of`: whose engine is taken without it.
 void AddWorld(CLI::App* app, std::string* world, const std::string& default_of);
-/// Adds --drives.
 CLI::Option* AddDrives(CLI::App* app, std::string* drives);
 /// Adds --jobs, of which there are as many as processors; `text`: the meaning.
 void AddJobs(CLI::App* app, int* jobs, const std::string& text);

@@ -53,7 +53,6 @@ struct TaskRows {
   Eigen::Ref<Eigen::VectorXd> acceleration;       ///< f*, t×1: (25), the reference's fed forward
 };
 
-/// Parts of a TaskTarget.
 struct TargetParts {
   bool position = false, rotation = false;  ///< each with its rates
   bool joints = false;

@@ -5,7 +5,6 @@
 
 namespace poise {
 
-/// Owns a message of an input port's type.
 class OwnedMessage {
  public:
   explicit OwnedMessage(const InputPort* port) : port_(port), message_(port->NewMessage()) {}

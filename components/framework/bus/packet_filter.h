@@ -51,7 +51,6 @@ class PacketFilter {
   size_t run_id_offset_;
 };
 
-/// Packets by verdict.
 class PacketCounters {
  public:
   void Count(PacketVerdict verdict) { ++counts_[static_cast<size_t>(verdict)]; }

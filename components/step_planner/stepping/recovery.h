@@ -130,7 +130,6 @@ class Recovery {
   double LoadTime() const;
   /// Share of the ramp under way, unloading or loading, that has passed at `time`, s.
   double Ramp(double time) const;
-  /// The first step goes where `plan` says.
   void SetPlan(const StepPlan& plan);
   /// A push while the feet are put side by side: the step catches it from now on. A foot that is
   /// being unloaded goes on from the load that it has, faster.

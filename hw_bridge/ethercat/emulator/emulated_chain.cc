@@ -17,7 +17,6 @@ struct CommandKind {
   bool reads = false, writes = false;
   bool reads_one_writes_others = false;  ///< who is addressed puts in what the others take
 };
-/// By command.
 constexpr CommandKind kCommands[kNumCommands] = {
     {},
     {Addressing::kPosition, true, false},

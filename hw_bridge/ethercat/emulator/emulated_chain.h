@@ -40,7 +40,6 @@ class EmulatedChain final : public FrameHandler {
   int64_t refused() const { return refused_; }
 
  private:
-  /// A datagram in place, at one slave.
   void Process(const Datagram& datagram, std::span<uint8_t> bytes, EmulatedSlave* slave,
                int64_t now);
   void LatchReceiveTimes(int64_t now);

@@ -25,7 +25,6 @@ class SocketLink : public Link {
   int fd() const { return socket_; }
 
  protected:
-  /// Waits until the socket is readable or the deadline has passed.
   bool WaitReadable(int64_t deadline) const;
 
   FileDescriptor socket_;
