@@ -5,7 +5,7 @@
 
 #include "components/framework/state_archive.h"
 #include "components/messages/motion.h"
-#include "components/messages/quintic_move.h"
+#include "components/messages/quintic.h"
 
 namespace poise {
 

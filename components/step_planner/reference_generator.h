@@ -6,7 +6,7 @@
 
 #include "components/framework/state_archive.h"
 #include "components/messages/motion.h"
-#include "components/messages/quintic_move.h"
+#include "components/messages/quintic.h"
 #include "components/robot/foot.h"
 #include "components/step_planner/step_planner.pb.h"
 

@@ -7,7 +7,7 @@
 
 #include "components/framework/tick_time.h"
 #include "components/messages/motion.h"
-#include "components/messages/quintic_move.h"
+#include "components/messages/quintic.h"
 #include "components/messages/touch_load.h"
 #include "poise/planner_status_t.hpp"
 
