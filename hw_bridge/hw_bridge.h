@@ -9,12 +9,31 @@
 #include "components/robot/robot_model.h"
 #include "hw_bridge/drive_buses.h"
 #include "hw_bridge/hw_bridge.pb.h"
-#include "hw_bridge/simulated_drive_bus.h"
 #include "hw_bridge/supervisor.h"
 #include "poise/emergency_stop_t.hpp"
 #include "poise/robot_sensors_t.hpp"
 
 namespace poise {
+
+/// The drive bus of the simulated robot: two ports of the graph.
+class SimulatedDriveBus final : public DriveBus {
+ public:
+  /// `feedback` must outlive the bus.
+  explicit SimulatedDriveBus(const Input<drive_feedback_t>* feedback) : feedback_(feedback) {}
+
+  const drive_feedback_t* Receive() override {
+    return feedback_->present() ? &**feedback_ : nullptr;
+  }
+  /// The message that the bridge publishes is the command.
+  void Send(const drive_command_t&) override {}
+  bool impedance() const override { return true; }
+  SensorsOfBus sensors() const override { return {.velocity = true}; }
+  const BusHealth& health() const override { return health_; }
+
+ private:
+  const Input<drive_feedback_t>* feedback_;
+  BusHealth health_;
+};
 
 /// Stage "sense": drive_feedback → robot_sensors, in SI units, wrenches turned into robot on
 /// environment. Stage "actuate": joint_command, emergency_stop (latest) → drive_command,
