@@ -35,20 +35,8 @@ void WithWord(const Leaf& leaf, const Visit& visit) {
 }  // namespace
 
 size_t SizeOf(Number number) {
-  switch (number) {
-    case Number::kInt8:
-    case Number::kUint8:
-      return 1;
-    case Number::kInt16:
-      return 2;
-    case Number::kInt32:
-    case Number::kFloat:
-      return 4;
-    case Number::kInt64:
-    case Number::kDouble:
-      break;
-  }
-  return 8;
+  constexpr size_t kSizes[] = {1, 1, 2, 4, 8, 4, 8};  // in the order of Number
+  return kSizes[static_cast<size_t>(number)];
 }
 
 std::vector<std::string> Leaf::Paths() const {
