@@ -48,26 +48,39 @@ bool Carries(const RunRecord& run, const std::vector<Interval>& off, int64_t tic
   });
 }
 
+/// N: a foot that bears less is in the air.
+double LeastLoad(const RunRecord& run) {
+  return kUnloadedShare * run.robot.total_mass() * robot::kGravity;
+}
+
 /// What IsDown compares with, found once: the truth at time 0, or where a part of a run begins.
 class Stance {
  public:
-  explicit Stance(const RunRecord& run) : lead_ticks_(run.spec.lead_ticks()) {
+  explicit Stance(const RunRecord& run)
+      : lead_ticks_(run.spec.lead_ticks()), least_(LeastLoad(run)) {
     for (const auto& [tick, start] : Messages(run.truth, lead_ticks_, run.num_ticks)) {
       up_ = Up(*start);
       height_ = ComHeight(*start);
+      ground_ = start->com_position[2] - height_;
       return;
     }
   }
   bool Left(int64_t tick, const ground_truth_t& truth) const {
     if (truth.fallen != 0) return true;
     if (tick < lead_ticks_ || !(height_ > kLeastHeight)) return false;
-    return Up(truth).dot(up_) < std::cos(kDownTilt) || ComHeight(truth) < kDownShare * height_;
+    double height = ComHeight(truth);
+    // Feet in the air, which a robot may pull up in a leap, do not tell where the ground is.
+    if (std::ranges::all_of(truth.foot_wrench,
+                            [&](const wrench_t& w) { return -w.force[2] < least_; }))
+      height = std::max(height, truth.com_position[2] - ground_);
+    return Up(truth).dot(up_) < std::cos(kDownTilt) || height < kDownShare * height_;
   }
 
  private:
   int64_t lead_ticks_;
+  double least_;  // N
   Eigen::Vector3d up_ = Eigen::Vector3d::UnitZ();
-  double height_ = 0;
+  double height_ = 0, ground_ = 0;
 };
 
 }  // namespace
@@ -97,7 +110,7 @@ std::array<std::vector<Interval>, 2> OffTheGround(const RunRecord& run) {
   std::array<std::vector<Interval>, 2> off;
   if (run.truth.empty()) return off;
   const int64_t down = DownTick(run).value_or(run.num_ticks);
-  const double least = kUnloadedShare * run.robot.total_mass() * robot::kGravity;
+  const double least = LeastLoad(run);
   for (size_t foot = 0; foot < 2; ++foot) {
     const auto unloaded = [&](int64_t tick) -> std::optional<bool> {
       if (tick >= down) return false;

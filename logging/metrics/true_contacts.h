@@ -34,7 +34,9 @@ std::vector<TrueSupport> TrueSupports(const RunRecord& run);
 
 /// True when the robot is down at `tick`: the simulator calls it fallen, its body is tilted by more
 /// than 1 rad from how it stood at time 0, or its COM has less than half the height above the lower
-/// sole that it had then (before time 0 the simulator alone says so). Empty without GROUND_TRUTH.
+/// sole that it had then (before time 0 the simulator alone says so). While no foot bears 2 % of
+/// the weight, its height above the ground of time 0 counts where that is more. Empty without
+/// GROUND_TRUTH.
 std::optional<bool> IsDown(const RunRecord& run, int64_t tick);
 /// The first tick in which it is down; empty when there is none.
 std::optional<int64_t> DownTick(const RunRecord& run);

@@ -294,6 +294,17 @@ TEST_F(ForeignControllerTest, ARobotThatLiesIsDownWhateverTheSimulatorCallsIt) {
   EXPECT_EQ(DownTick(Read()), 65);
 }
 
+TEST_F(ForeignControllerTest, ARobotInTheAirWithItsFeetPulledUpIsNotDown) {
+  Walk(0);
+  for (size_t t = 60; t < kTicks; ++t) {
+    for (pose_t& foot : truth_[t].foot_pose) foot.position[2] = 0.5;
+    for (wrench_t& wrench : truth_[t].foot_wrench) wrench.force[2] = 0;
+  }
+  EXPECT_EQ(DownTick(Read()), std::nullopt);
+  for (size_t t = 70; t < kTicks; ++t) truth_[t].com_position[2] = 0.3;
+  EXPECT_EQ(DownTick(Read()), 70) << "0.3 m above the ground, of 0.7 m";
+}
+
 // The table of needs is held to the metrics themselves: what a metric is not said to need changes
 // nothing, and without any of what it needs it has no value.
 TEST_F(ForeignControllerTest, EveryMetricNeedsWhatIsSaid) {

@@ -140,22 +140,22 @@ SupportStory Supports(const RunRecord& run) {
 
 /// What the simulator says of a fall in brackets: "(body tilt 0.71 rad)".
 std::string HowItFell(const RunRecord& run) {
-  const std::string reason = EndReason(run);
-  const size_t begin = reason.find('(');
-  if (reason.find("fell") != std::string::npos && begin != std::string::npos) {
-    return fmt::format(" {}", reason.substr(begin));
-  }
-  // The simulator went on.
   const std::optional<int64_t> down = logging::DownTick(run);
-  if (!down || run.truth.at(*down)->fallen != 0) return "";
+  if (!down) return "";
+  const std::string reason = EndReason(run);
+  const size_t fell = reason.find("the robot fell"), begin = reason.find('(');
+  const bool told = fell != std::string::npos && begin != std::string::npos;
+  if (run.truth.at(*down)->fallen != 0) return told ? fmt::format(" {}", reason.substr(begin)) : "";
+  // The simulator went on.
   const auto height = [&](int64_t tick) {
     const ground_truth_t* const truth = run.truth.at(tick);
     return truth == nullptr ? 0 : logging::ComHeight(*truth);
   };
   return fmt::format(
       " (at the end its centre of mass was {:.2f} m above its lower sole, at first {:.2f} m; the "
-      "simulator did not call it fallen)",
-      height(run.num_ticks - 1), height(run.spec.lead_ticks()));
+      "simulator {})",
+      height(run.num_ticks - 1), height(run.spec.lead_ticks()),
+      told ? fmt::format("says: {}", reason.substr(fell)) : "did not call it fallen");
 }
 
 std::string Capital(std::string text) {
