@@ -79,6 +79,8 @@ TEST_F(RunningRunsTest, TheOnlyOneIsMeantAndADeadOneForgotten) {
   ExpectUsageError({"top", "--once"}, {"no run is going on"});
   const std::string run = folder / "elsewhere";
   const std::unique_ptr<PoiseProgram> program = Start(run);
+  ExpectUsageError({"report", run, "--no-html"}, {Whole(run), "this run still goes on"});
+  ExpectUsageError({"log", "check", run + "/run.lcm"}, {Whole(run), "this run still goes on"});
   const ProgramResult top = RunPoise({"top", "--once", "--interval", "1"});
   EXPECT_EQ(top.exit_code, 0) << top.output;
   EXPECT_THAT(top.output, HasSubstr(Whole(run)));

@@ -109,7 +109,7 @@ struct LogCheckOptions : LogOptions {
 };
 
 int CheckLog(const LogCheckOptions& options) {
-  const std::string log = FindLog(options.run).string();
+  const std::string log = FindEndedLog(options.run).string();
   const logging::LogSurvey survey = logging::SurveyLog(log);
   std::vector<std::string> problems = survey.Problems(options.all ? 0 : kPlaces);
   const auto altered = logging::CheckSums(log);
@@ -256,7 +256,7 @@ struct PackOptions : LogOptions {
 fs::path PackedName(const fs::path& log) { return fs::path(log).replace_extension(".packed"); }
 
 int Pack(const PackOptions& options) {
-  const fs::path log = FindLog(options.run);
+  const fs::path log = FindEndedLog(options.run);
   const fs::path packed = PackedName(log);
   CatchStopSignals();
   StatusLine line(/*quiet=*/false);

@@ -49,8 +49,10 @@ int Report(const ReportOptions& options) {
   if (!options.run.empty() && std::filesystem::exists(charts)) return ReportCharts(options);
   StageLine line(/*quiet=*/false);
   std::vector<ReportedRun> runs;
-  runs.push_back(ReadReportedRun(options.run, &line));
-  for (const std::string& other : options.others) runs.push_back(ReadReportedRun(other, &line));
+  runs.push_back(ReadReportedRun(FindEndedLog(options.run), &line));
+  for (const std::string& other : options.others) {
+    runs.push_back(ReadReportedRun(FindEndedLog(other), &line));
+  }
   const ReportedRun& run = runs.front();
   const std::string commit = run.record.spec.poise_commit().empty()
                                  ? ""

@@ -169,6 +169,20 @@ fs::path FindLog(const std::string& run) {
   return path;
 }
 
+fs::path FindEndedLog(const std::string& run) {
+  fs::path log = FindLog(run);
+  const fs::path dir = fs::absolute(log).parent_path();
+  const FileDescriptor fd(open(dir.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (log.filename() == "run.lcm" && fd >= 0 && flock(fd, LOCK_SH | LOCK_NB) != 0 &&
+      errno == EWOULDBLOCK) {
+    throw ConfigError(
+        fmt::format("{}: this run still goes on: wait for its end, or look at it with poise top or "
+                    "poise view",
+                    dir.string()));
+  }
+  return log;
+}
+
 void WarnOfRunInfo(const fs::path& log) {
   const std::string warning = logging::RunInfoWarning(log.string());
   if (!warning.empty()) fmt::print(stderr, "warning: {}\n", logging::ForTerminal(warning));

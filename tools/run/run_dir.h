@@ -56,6 +56,9 @@ void PointLatestTo(const std::filesystem::path& dir);
 /// A packed log is made again. Throws ConfigError, LogError.
 std::filesystem::path FindLog(const std::string& run);
 
+/// FindLog of a run that has ended: throws ConfigError where it still goes on, too.
+std::filesystem::path FindEndedLog(const std::string& run);
+
 /// Warns on stderr where a log's RUN_INFO is damaged and the run is told by its folder's files.
 void WarnOfRunInfo(const std::filesystem::path& log);
 
