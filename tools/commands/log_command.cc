@@ -20,6 +20,7 @@
 #include "tools/run/run_dir.h"
 #include "tools/scenario/former_fields.h"
 #include "tools/scenario/registry.h"
+#include "tools/scenario/run_setup.h"
 #include "tools/scenario/scenario_loading.h"
 
 namespace poise {
@@ -257,6 +258,15 @@ fs::path PackedName(const fs::path& log) { return fs::path(log).replace_extensio
 
 int Pack(const PackOptions& options) {
   const fs::path log = FindEndedLog(options.run);
+  logging::LogReader reader(log.string());
+  const RunSpec spec = logging::FindRunInfo(&reader, log.string()).spec;
+  for (int i = 0; i < spec.graph().component_size(); ++i) {
+    if (const std::string why = WhyNotReplayed(spec, i); !why.empty()) {
+      throw logging::LogError(
+          fmt::format("{}: cannot be made again, and is not packed: {}: {}", log.string(),
+                      ForTerminal(spec.graph().component(i).name()), ForTerminal(why)));
+    }
+  }
   const fs::path packed = PackedName(log);
   CatchStopSignals();
   StatusLine line(/*quiet=*/false);

@@ -30,7 +30,6 @@
 #include "tools/run/run_dir.h"
 #include "tools/run/scenario_run.h"
 #include "tools/run/stage_watch.h"
-#include "tools/scenario/described_components.h"
 #include "tools/scenario/former_fields.h"
 #include "tools/scenario/registry.h"
 #include "tools/scenario/run_setup.h"
@@ -109,24 +108,6 @@ void Print(const logging::ReplayedComponent& component, const logging::LogMessag
   }
 }
 
-/// Why the component cannot be replayed; empty: it can.
-std::string WhyNot(const RunSpec& spec, int component) {
-  const std::string& type = TypeOf(spec.graph().component(component));
-  if (IsDescribed(type)) {
-    return fmt::format("{} is a program of its own, which no other process holds", type);
-  }
-  if (Components().Find(type) == nullptr) {
-    return fmt::format(
-        "this program does not know its type {}: an object of Python's in the place of a "
-        "component, or of a module or program whose folder is not on POISE_PATH",
-        ForTerminal(type));
-  }
-  if (SpeaksToDrives(spec, component)) {
-    return "the log does not hold what passes between bridge and drives";
-  }
-  return "";
-}
-
 /// Makes a run's folder of what was replayed: its log, table and page.
 void WriteRun(const ReplayOptions& options, const std::string& log, const fs::path& dir,
               const logging::LogReplay& replay, const RunSpec& spec,
@@ -180,8 +161,9 @@ int CompareReplay(const ReplayOptions& options, const std::string& log) {
   const logging::LogMessages messages(log);
   bool equal = true, replayed = false;
   for (const int index : Wanted(spec, options.components)) {
-    if (const std::string why = WhyNot(spec, index); !why.empty()) {
-      fmt::print("{}: not replayed: {}\n", ForTerminal(spec.graph().component(index).name()), why);
+    if (const std::string why = WhyNotReplayed(spec, index); !why.empty()) {
+      fmt::print("{}: not replayed: {}\n", ForTerminal(spec.graph().component(index).name()),
+                 ForTerminal(why));
       continue;
     }
     replayed = true;

@@ -480,13 +480,25 @@ std::optional<RunSource> TakeSource(const RunSpec& spec) {
 
 }  // namespace
 
-bool SpeaksToDrives(const RunSpec& spec, int component) {
+std::string WhyNotReplayed(const RunSpec& spec, int component) {
   const ComponentInstance& instance = spec.graph().component(component);
+  const std::string& type = TypeOf(instance);
+  if (IsDescribed(type)) {
+    return fmt::format("{} is a program of its own, which no other process holds", type);
+  }
+  if (Components().Find(type) == nullptr) {
+    return fmt::format(
+        "this program does not know its type {}: an object of Python's in the place of a "
+        "component, or of a module or program whose folder is not on POISE_PATH",
+        type);
+  }
   const int config = ConfigIndex(spec, instance);
-  if (config < 0) return false;
-  const Scenario own = ReadConfig(spec.config(config), TypeOf(instance));
-  return std::ranges::any_of(Components().TraitsOf(TypeOf(instance)).drive_links,
-                             [&](const DriveLink& end) { return HasField(own, end.group); });
+  if (config < 0) return "";
+  const Scenario own = ReadConfig(spec.config(config), type);
+  const bool drives =
+      std::ranges::any_of(Components().TraitsOf(type).drive_links,
+                          [&](const DriveLink& end) { return HasField(own, end.group); });
+  return drives ? "the log does not hold what passes between bridge and drives" : "";
 }
 
 RunSource ChoosePorts(const Scenario& scenario, RunSpec* spec) {

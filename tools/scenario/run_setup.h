@@ -55,9 +55,8 @@ bool IsThere(const OptionalPort& port, const Scenario& scenario);
 /// order. Throws ConfigError.
 void ChangeConfigurations(const std::vector<std::string>& changes, RunSpec* spec);
 
-/// Whether a component is at one of the ends of what passes between a bridge and drives, which no
-/// log holds.
-bool SpeaksToDrives(const RunSpec& spec, int component);
+/// Why a log's component cannot do its work again; empty: it can.
+std::string WhyNotReplayed(const RunSpec& spec, int component);
 
 /// A block of free UDP ports for the channels of the scenario's run, and its source port taken. The
 /// ends of drives are configured anew, apart from those of other runs. Throws ConfigError when none
