@@ -61,6 +61,12 @@ double Evaluate(const std::string& expression, const std::map<std::string, doubl
   return value;
 }
 
+bool HasVariable(const std::string& expression, const std::string& name) {
+  mu::Parser parser;
+  parser.SetExpr(expression);
+  return parser.GetUsedVar().contains(name);
+}
+
 bool IsExpressionName(const std::string& name) {
   if (name.empty() || std::isdigit(static_cast<unsigned char>(name[0]))) return false;
   for (const unsigned char c : name) {

@@ -17,6 +17,9 @@ class ExpressionError : public std::runtime_error {
 /// ExpressionError: what is no expression, an unknown name, a value that is not finite.
 double Evaluate(const std::string& expression, const std::map<std::string, double>& values);
 
+/// Whether `expression`, which Evaluate takes, has the variable `name` in it.
+bool HasVariable(const std::string& expression, const std::string& name);
+
 /// True for what can be a variable's name in an expression.
 bool IsExpressionName(const std::string& name);
 

@@ -6,8 +6,10 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_rules.h"
+#include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
 #include "sim/random.h"
+#include "tools/scenario/scenario.pb.h"
 #include "tools/sweep/sweep_expression.h"
 
 namespace poise {
@@ -258,6 +260,25 @@ void CheckVariables(const Sweep& sweep, bool limit) {
                         fmt::format("'{}' {}", sweep.assign(i).value(), error.what()));
     }
   }
+  const auto check_used = [&](const std::string& path, const std::string& name) {
+    if (std::ranges::any_of(sweep.assign(), [&](const Assignment& assign) {
+          return HasVariable(assign.value(), name);
+        })) {
+      return;
+    }
+    std::vector<std::string> fields;
+    const auto& scenario = *Scenario::descriptor();
+    for (int i = 0; i < scenario.field_count(); ++i) fields.push_back(scenario.field(i)->name());
+    const std::vector<std::string> near = Nearest(name, fields);
+    throw ConfigError(
+        path, fmt::format("'{}' is no field of a scenario, and no expression uses it{}", name,
+                          near.empty() ? "" : fmt::format("; did you mean {}?", near.front())));
+  };
+  for (int i = 0; i < sweep.vary_size(); ++i) {
+    const Variable& v = sweep.vary(i);
+    if (!v.has_field() && v.choice_size() == 0) check_used(fmt::format("vary[{}]", i), v.name());
+  }
+  if (limit && !sweep.limit().has_field()) check_used("limit.name", sweep.limit().name());
 }
 
 }  // namespace poise

@@ -188,8 +188,14 @@ TEST(SweepPoints, ExpressionsKnowConstants) {
 }
 
 TEST(SweepPoints, NamesTheFieldThatIsWrong) {
-  EXPECT_EQ(SweepProblemOf("vary { name: 'a' from: 0 to: 1 steps: 2 }"), "");
-  EXPECT_EQ(SweepProblemOf("random: 5 vary { name: 'a' from: 0 to: 1 }"), "");
+  EXPECT_EQ(SweepProblemOf("vary { field: 'a' from: 0 to: 1 steps: 2 }"), "");
+  EXPECT_EQ(SweepProblemOf("random: 5 vary { field: 'a' from: 0 to: 1 }"), "");
+  EXPECT_EQ(
+      SweepProblemOf("vary { name: 'duraton' value: 1 } assign { field: 'x' value: 'sin(pi)' }"),
+      "vary[0]: 'duraton' is no field of a scenario, and no expression uses it; did you mean "
+      "duration?");
+  EXPECT_EQ(SweepProblemOf("limit { name: 'foo' min: 0 max: 1 }", true),
+            "limit.name: 'foo' is no field of a scenario, and no expression uses it");
   const auto starts = [](const std::string& text, const std::string& field, bool limit = false) {
     const std::string problem = SweepProblemOf(text, limit);
     EXPECT_TRUE(problem.starts_with(field + ": ")) << text << " gave " << problem;
