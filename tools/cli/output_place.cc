@@ -75,6 +75,11 @@ fs::path MakeOutFolder(const std::string& out) {
 
 void CheckFileFree(const std::string& flag, const fs::path& file, bool force) {
   std::error_code error;
+  const fs::path folder = fs::absolute(file).parent_path() / "";
+  if (access(fs::exists(file, error) ? file.c_str() : folder.c_str(), W_OK) != 0) {
+    throw ConfigError(
+        fmt::format("{} {}: cannot be written: {}", flag, file.string(), std::strerror(errno)));
+  }
   if (force || !fs::is_regular_file(file, error) || logging::IsEventLog(file.string())) return;
   throw ConfigError(fmt::format("{} {}: exists; choose another name, or replace it with --force",
                                 flag, file.string()));
@@ -126,8 +131,12 @@ void WriteFile(const fs::path& path, const std::string& text) {
   std::ofstream out(path, std::ios::binary);
   out << text;
   if (out.flush()) return;
-  throw ConfigError(fmt::format("{}: cannot be written: {}", path.string(),
-                                errno != 0 ? std::strerror(errno) : "unknown reason"));
+  const std::string why = errno != 0 ? std::strerror(errno) : "unknown reason";
+  // What a full disk leaves of a file would stand in the way of the next try.
+  if (std::error_code error; out.is_open() && fs::is_regular_file(path, error)) {
+    fs::remove(path, error);
+  }
+  throw ConfigError(fmt::format("{}: cannot be written: {}", path.string(), why));
 }
 
 bool WriteAll(int fd, std::string_view text) {

@@ -18,8 +18,8 @@ void CheckFolderFree(const std::string& flag, const std::filesystem::path& folde
 /// Makes the folder of --out where it is not there; its absolute path. Throws ConfigError.
 std::filesystem::path MakeOutFolder(const std::string& out);
 
-/// CheckFolderFree for a file; a device or a pipe is always free. Logs are left to who writes:
-/// nothing replaces one (PartialFile).
+/// CheckFolderFree for a file, which must be one that can be written; a device or a pipe is always
+/// free. Logs are left to who writes: nothing replaces one (PartialFile).
 void CheckFileFree(const std::string& flag, const std::filesystem::path& file, bool force);
 
 /// Bytes that the log of a run will take: its messages' sizes and rates. `spec` holds the channels'

@@ -40,10 +40,12 @@ void CheckOneText(const fs::path& folder, const fs::path& text) {
 
 /// Puts the maker's file into the folder, untouched.
 void CopyFile(const fs::path& from, const fs::path& to) {
-  std::error_code error;
+  std::error_code error, ignored;
   if (fs::equivalent(from, to, error)) return;
+  const bool is_new = !fs::exists(to, ignored);
   fs::copy_file(from, to, fs::copy_options::overwrite_existing, error);
   if (error) {
+    if (is_new) fs::remove(to, ignored);
     throw ConfigError(
         fmt::format("{}: cannot be copied to {}: {}", from.string(), to.string(), error.message()));
   }
@@ -64,11 +66,11 @@ int ImportIt(ImportArguments arguments) {
   const std::string& name = imported.robot.name();
   const fs::path folder = arguments.to.empty() ? fs::path(name) : fs::path(arguments.to);
   const fs::path text = folder / (name + ".pbtxt");
-  CheckFileFree("--to", text, arguments.force);
-  if (!arguments.force) CheckOneText(folder, text);
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw ConfigError(fmt::format("{}: {}", folder.string(), error.message()));
+  CheckFileFree("--to", text, arguments.force);
+  if (!arguments.force) CheckOneText(folder, text);
   CopyFile(options.file, folder / options.file.filename());
   WriteFile(text, RobotText(imported));
 

@@ -1,5 +1,7 @@
 #include "tools/scenario/scenario_loading.h"
 
+#include <net/if.h>
+
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -351,6 +353,10 @@ void ApplyDrives(const RunChanges& changes, LoadedScenario* loaded) {
       const std::string interface = end.drives
                                         ? changes.link.substr(comma + 1)
                                         : changes.link.substr(kRaw.size(), comma - kRaw.size());
+      if (if_nametoindex(interface.c_str()) == 0) {
+        throw ConfigError(
+            fmt::format("--link {}: there is no network interface '{}'", changes.link, interface));
+      }
       ApplyChange({end.link + ".interface=" + interface, "--link"}, loaded);
     }
     if (!changes.capture.empty() && !end.capture.empty()) {

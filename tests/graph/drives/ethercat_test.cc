@@ -104,6 +104,10 @@ TEST(Ethercat, ASweepIsOfTheRunsThatPoiseRunMakes) {
   EXPECT_GT(std::stod(rows[1].at("bus_frames_sent")), 0);
   EXPECT_TRUE(logging::CompareLogs(run + "/run.lcm", sweep + "/logs/1/run.lcm").equal());
   EXPECT_NE(ReadAll(sweep + "/charts.json").find("--drives ethercat"), std::string::npos);
+  const ProgramResult pack = RunPoise({"log", "pack", run});
+  EXPECT_EQ(pack.exit_code, 1);
+  EXPECT_NE(pack.output.find("what passes between bridge and drives"), std::string::npos)
+      << pack.output;
 }
 
 TEST(Ethercat, RefusesWhatCannotBe) {
@@ -112,6 +116,8 @@ TEST(Ethercat, RefusesWhatCannotBe) {
                    {"--inline", "--drives"});
   ExpectUsageError({"run", StandScenario(), "--link", "udp"}, {"--link", "--drives"});
   ExpectUsageError(Arguments(folder / "a", {"--link", "raw:eth0"}), {"--link raw:eth0", "two"});
+  ExpectUsageError(Arguments(folder / "a", {"--link", "raw:none0,none1"}),
+                   {"--link raw:none0,none1", "no network interface 'none"});
   ExpectUsageError(Arguments(folder / "b", {"--set", "drive_emulator.wiring[0].joint=tail"}),
                    {"drive_emulator.wiring[0].joint", "tail"});
 }
