@@ -1,4 +1,7 @@
 // The program `poise`: runs, checks and inspects process graphs.
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <csignal>
 #include <exception>
@@ -32,6 +35,13 @@ constexpr void (*kCommands[])(CLI::App*, Command*) = {
 
 int main(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);  // a file that grows too large is an error that is told
+  // What is opened later gets none of the standard streams' numbers, where one was closed: a
+  // process started from here has its own streams there. What is printed still fails, but nobody
+  // is there to hear of an error.
+  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (fcntl(fd, F_GETFD) >= 0) continue;
+    if (open("/dev/null", fd == STDERR_FILENO ? O_WRONLY : O_RDONLY) != fd) return 2;
+  }
   poise::UsePlainStreams();
   // Modules come before the commands, which tell what there is. Help and version are there without
   // them.

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <regex>
 
+#include "tests/graph/current_folder.h"
 #include "tests/graph/poise_program.h"
 
 namespace poise {
@@ -66,6 +67,8 @@ TEST_F(OutputPlaceTest, NothingIsReplacedWithoutForce) {
   ExpectUsageError({"log", "cut", run_, "--to", "0.1", "--out", mine}, {"--out", mine, "--force"});
   ExpectUsageError({"run", StandScenario(), "--drives", "ethercat", "--capture", mine},
                    {"--capture", mine, "--force"});
+  ExpectUsageError({"run", StandScenario(), "--drives", "ethercat", "--capture", mine + "/a.pcap"},
+                   {"--capture", "cannot be written: Not a directory"});
   EXPECT_EQ(ReadAll(mine), "my notes");
 
   EXPECT_EQ(RunPoise(Run({"--inline", "--force", "--duration", "0.2"})).exit_code, 0);
@@ -100,6 +103,22 @@ TEST_F(OutputPlaceTest, AFullDiskIsNamed) {
       std::system((std::string(POISE_BIN_DIR "/poise list metrics >/dev/full 2>") + text).c_str());
   EXPECT_NE(status, 0);
   EXPECT_THAT(ReadAll(text), HasSubstr("No space left on device"));
+}
+
+TEST_F(OutputPlaceTest, WhatAFullDiskLeavesOfAFileDoesNotBlockTheNextTry) {
+  const CurrentFolder here(folder_ / "");
+  {
+    const FileSizeLimit limit(1000);
+    ExpectUsageError({"new", "scenario", "mine"}, {"mine.pbtxt", "File too large"});
+  }
+  EXPECT_EQ(RunPoise({"new", "scenario", "mine"}).exit_code, 0);
+}
+
+TEST_F(OutputPlaceTest, ARunNeedsNoStandardStream) {
+  const std::string command = POISE_BIN_DIR "/poise run " + StandScenario() +
+                              " --quiet --duration 0.1 --out " + run_ + " <&- >&- 2>&-";
+  EXPECT_NE(std::system(command.c_str()), 2 << 8);
+  EXPECT_EQ(ReadSummary(run_)["passed"], true);
 }
 
 TEST_F(OutputPlaceTest, ALogThatCannotFitIsRefusedAndItsSizeIsRight) {
