@@ -114,6 +114,19 @@ TEST(Defects, AllAreListedAtOnce) {
               kShinInertia[1], 1e-12);
 }
 
+TEST(Defects, ReversedLimitsAreSwapped) {
+  std::string text = SimpleBiped();
+  const size_t joint = text.find("<joint name='left_knee"), lower = text.find("lower='", joint);
+  const size_t end = text.find(" effort", lower);
+  text.replace(lower, end - lower, "lower='0.6' upper='-0.4'");
+  const RobotImport imported = ImportText("reversed", text);
+  EXPECT_THAT(Defects(imported), HasSubstr("1 joint has a lower limit above the upper one"));
+  const robot::RobotModel model = robot::MakeRobot(imported.robot, text);
+  EXPECT_EQ(std::ranges::count_if(model.joints(),
+                                  [](const auto& j) { return j.lower == -0.4 && j.upper == 0.6; }),
+            1);
+}
+
 TEST(Defects, CoupledPrismaticAndFingerJointsAreLockedWhereTheyStand) {
   Biped changes;
   const auto link = [](const std::string& name) {

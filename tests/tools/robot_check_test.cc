@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -64,6 +65,16 @@ TEST(RobotCheck, PushesAreThePendulumsToTheSolesEdges) {
   EXPECT_NEAR(check.pushes[8].left, momentum * 0.15, 1e-4);
   // Obliquely over the long edge or the short one, whichever is nearer.
   EXPECT_NEAR(check.pushes[2].right, momentum * 0.075 * std::numbers::sqrt2, 1e-4);
+}
+
+TEST(RobotCheck, MassesInGramsAndMarginsAtTheirCapsAreTold) {
+  EXPECT_NE(FormatRobotCheck(Paper(), 120).find("≥ 5 ticks"), std::string::npos);
+  const RobotCheck heavy =
+      Edited("foot {",
+             "repair { link: \"upper_body\" mass: 22630 inertia { ixx: 9 iyy: 9 izz: 9 } } foot {");
+  EXPECT_TRUE(std::ranges::any_of(heavy.defects, [](const std::string& defect) {
+    return defect.find("masses that are in g") != std::string::npos;
+  })) << testing::PrintToString(heavy.defects);
 }
 
 TEST(RobotCheck, AKneeBearsMoreOnOneFootThanOnBoth) {

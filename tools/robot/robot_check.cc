@@ -32,6 +32,8 @@ constexpr int kDirections = 16;
 constexpr double kReachStep = 0.005;   // m, that reach is found to
 constexpr double kLongestReach = 1.5;  // m, that is tried
 constexpr double kAtLimit = 0.01;      // rad
+// kg/m³, a robot's mass over the cube of its COM's height: a person has 75.
+constexpr double kMostDensity = 3000;
 double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 std::optional<RobotState> TrySolve(const RobotModel& model, const robot::PostureGoal& goal) {
@@ -184,6 +186,11 @@ void FindLoops(RobotCheck* check) {
 
 void FindDefects(RobotCheck* check) {
   const RobotModel& model = check->model;
+  if (model.total_mass() > kMostDensity * std::pow(check->com_height, 3)) {
+    check->defects.push_back(fmt::format(
+        "it weighs {:.3g} kg with its COM {:.3g} m above the soles: correct masses that are in g",
+        model.total_mass(), check->com_height));
+  }
   for (size_t j = 0; j < model.joints().size(); ++j) {
     const robot::Joint& joint = model.joints()[j];
     const JointLoad& load = check->loads[j];
@@ -274,8 +281,10 @@ std::string FormatLoops(const RobotCheck& check, int columns) {
   for (const LoopFacts& loop : check.loops) {
     rows.push_back({loop.support,
                     TableCell(loop.stable ? "yes" : "no", loop.stable ? Tone::kPlain : Tone::kBad),
-                    fmt::format("{:.2f}", loop.gain_margin),
-                    fmt::format("{} ticks", loop.delay_margin),
+                    loop.gain_margin < balance::kMostGain ? fmt::format("{:.2f}", loop.gain_margin)
+                                                          : fmt::format("≥ {}", balance::kMostGain),
+                    fmt::format("{}{} ticks", loop.delay_margin < balance::kMostDelay ? "" : "≥ ",
+                                loop.delay_margin),
                     fmt::format("{:.2g} 1/s", loop.slowest),
                     fmt::format("{:.2g} at {:.1f} Hz", loop.least_damping, loop.frequency)});
   }

@@ -130,20 +130,22 @@ class Repairer {
       if (body.joint != nullptr) beyond[body.joint->name] = body.beyond;
     }
     std::map<std::pair<double, double>, JointLimit*> same;
-    int no_effort = 0, no_velocity = 0, no_range = 0;
+    int no_effort = 0, no_velocity = 0, no_range = 0, swapped_range = 0;
     std::vector<std::string> odd_effort, odd_velocity;
     for (SourceJoint& joint : source_.joints) {
       if (joint.kind == JointKind::kFixed || joint.locked) continue;
       const bool effort = !(joint.effort > 0) || !std::isfinite(joint.effort);
       const bool velocity = !(joint.velocity > 0) || !std::isfinite(joint.velocity);
       if (joint.kind == JointKind::kRevolute && !(joint.lower < joint.upper)) {
-        // The joint gets half a turn to either side, which no leg's joint leaves.
+        const bool swapped = joint.lower > joint.upper;
+        if (swapped) std::swap(joint.lower, joint.upper);
+        // Without a range the joint gets half a turn to either side, which no leg's joint leaves.
+        if (!swapped) joint.lower = -M_PI, joint.upper = M_PI;
         JointLimit* const limit = result_.robot.add_limit();
         limit->add_joint(joint.name);
-        limit->set_lower(-M_PI);
-        limit->set_upper(M_PI);
-        joint.lower = -M_PI, joint.upper = M_PI;
-        ++no_range;
+        limit->set_lower(joint.lower);
+        limit->set_upper(joint.upper);
+        ++(swapped ? swapped_range : no_range);
       }
       const bool leg = IsLeg(joint.name);
       const bool no_motors = !effort && IsPlaceholderEffort(joint.effort, mass, leg);
@@ -183,6 +185,11 @@ class Repairer {
            done);
     };
     tell(no_range, "range", "guess: half a turn to either side");
+    if (swapped_range > 0) {
+      Tell(fmt::format("{} joint{} a lower limit above the upper one", swapped_range,
+                       swapped_range == 1 ? " has" : "s have"),
+           "guess: the two are swapped");
+    }
     tell(no_effort, "torque limit", "guess: by the robot's mass");
     tell(no_velocity, "velocity limit", "guess: 20 rad/s");
     tell_odd(odd_effort, "a torque limit in N·m",

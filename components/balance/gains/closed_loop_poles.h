@@ -64,13 +64,17 @@ ClosedLoopPoles ComputeClosedLoopPoles(const robot::RobotModel& model, const Sta
                                        const robot::FootArray<bool>& in_contact, double period,
                                        const LoopChange& change = {});
 
+/// Where the search for a margin ends.
+inline constexpr double kMostGain = 4;
+inline constexpr int kMostDelay = 5;  // ticks
+
 /// The largest factor on the feedback, from 1 up to `most`, with which it still stands, to a
 /// twentieth; below 1 when it does not stand at all: 0.
 double GainMargin(const robot::RobotModel& model, const StandingGains& gains,
-                  const robot::FootArray<bool>& in_contact, double period, double most = 4);
+                  const robot::FootArray<bool>& in_contact, double period, double most = kMostGain);
 /// The largest additional delay in ticks, up to `most`, with which it still stands; −1: not even
 /// without.
 int DelayMargin(const robot::RobotModel& model, const StandingGains& gains,
-                const robot::FootArray<bool>& in_contact, double period, int most = 5);
+                const robot::FootArray<bool>& in_contact, double period, int most = kMostDelay);
 
 }  // namespace poise::balance
