@@ -3,7 +3,9 @@
 
 #include <algorithm>
 
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/run.h"
+#include "fmt/format.h"
 #include "python/bindings/bindings.h"
 #include "python/session.h"
 
@@ -17,8 +19,11 @@ RunChanges ChangesOf(const py::dict& given) {
   RunChanges changes;
   changes.reference = false;
   const auto get = [&](const char* name, auto* to) {
-    if (given.contains(name) && !given[name].is_none()) {
+    if (!given.contains(name) || given[name].is_none()) return;
+    try {
       *to = given[name].cast<std::remove_reference_t<decltype(*to)>>();
+    } catch (const py::cast_error&) {
+      throw ConfigError(fmt::format("{}: cannot be {}", name, std::string(py::repr(given[name]))));
     }
   };
   get("set", &changes.set);
@@ -39,7 +44,13 @@ std::unique_ptr<Session> Make(const std::string& scenario, const py::dict& chang
   SessionOptions options;
   options.scenario = scenario;
   options.changes = ChangesOf(changes);
-  for (const auto& [name, object] : components) options.replaced[name] = FunctionsOf(object);
+  for (const auto& [name, object] : components) {
+    if (!py::hasattr(object, "_configure")) {
+      throw ConfigError(fmt::format("components: '{}' is {}; derive it from poise.Component", name,
+                                    std::string(py::repr(object))));
+    }
+    options.replaced[name] = FunctionsOf(object);
+  }
   options.plant = plant;
   options.keep = !out.empty() ? SessionOptions::Keep::kFolder
                  : record     ? SessionOptions::Keep::kMemory

@@ -106,6 +106,8 @@ class Environment:
 
     def step(self, ticks=1):
         """Runs up to `ticks` ticks; returns those run: fewer when the run ends. Ctrl-C stops it between ticks."""
+        if not isinstance(ticks, (int, np.integer)):
+            raise _poise.ConfigError(f"step: {ticks!r} is no whole number of ticks")
         return self._session.step(ticks)
 
     def __getitem__(self, channel):
@@ -120,8 +122,9 @@ class Environment:
 
     def push(self, force, body="", point=(0, 0, 0), duration=None):
         """N, world axes, at `point` (m, body frame) of a body (default: the base), for `duration` s or until set again."""
-        force = [float(x) for x in force]
-        point = [float(x) for x in point]
+        force, point = ([float(x) for x in vector] for vector in (force, point))
+        if len(force) != 3 or len(point) != 3:
+            raise _poise.ConfigError(f"push: force {force} and point {point} must have three numbers each")
         ticks = -1 if duration is None else max(1, round(float(duration) / self.tick_period))
         self._session.push(body, force, point, ticks)
 

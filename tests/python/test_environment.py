@@ -280,8 +280,14 @@ class Steps(unittest.TestCase):
         for force in ([np.nan, 0, 0], [np.inf, 0, 0]):
             with self.assertRaisesRegex(poise.ConfigError, "finite"):
                 env.push(force)
-        with self.assertRaises((TypeError, ValueError)):
+        with self.assertRaisesRegex(poise.ConfigError, "three numbers"):
             env.push([1, 2])
+        with self.assertRaisesRegex(poise.ConfigError, "step: 1.5"):
+            env.step(1.5)
+        with self.assertRaisesRegex(poise.ConfigError, "seed: cannot be -1"):
+            poise.Environment("stand", seed=-1)
+        with self.assertRaisesRegex(poise.ConfigError, "'task_controller' is <object"):
+            poise.Environment("stand", components={"task_controller": object()})
         with self.assertRaisesRegex(poise.ConfigError, "no joint 'elbow'"):
             env.override_torque("elbow", 1)
         with self.assertRaises(poise.ConfigError):
