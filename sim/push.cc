@@ -52,6 +52,9 @@ PushProfile::PushProfile(const Push& config, const robot::RobotModel& model, dou
   if (direction_.norm() < 1e-12) {
     throw ConfigError(field + ".direction_x", "no direction; set direction_x, _y or _z");
   }
+  if (!std::isfinite(direction_.norm())) {
+    throw ConfigError(field + ".direction_x", "too long a direction; its length does not matter");
+  }
   direction_.normalize();
   if (config.at_body()) {
     if (config.has_link() || config.has_point()) {
