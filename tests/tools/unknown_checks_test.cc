@@ -66,6 +66,16 @@ TEST_F(UnknownChecksTest, FeetWhoseSensorsAreAbsentAreObserved) {
   EXPECT_EQ(check.missing.front(), "ROBOT_SENSORS.foot_wrench or ROBOT_STATE.foot_wrench");
 }
 
+TEST(FormatMeasured, ShowsByHowMuchALimitIsBroken) {
+  CheckResult check;
+  check.measured = 70.000003;
+  check.at_most = 70.000001;
+  check.unit = "mm";
+  EXPECT_EQ(FormatMeasured(check), "70 mm");
+  check.passed = false;
+  EXPECT_EQ(FormatMeasured(check), "70.000003 mm");
+}
+
 TEST_F(UnknownChecksTest, TheyPassNothingAndFailNothing) {
   const std::vector<CheckResult> checks = Evaluate();
   EXPECT_TRUE(ChecksPass(checks));

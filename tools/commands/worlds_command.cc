@@ -69,7 +69,7 @@ std::string Nearest(const std::vector<WorldRun>& worlds, size_t row) {
   }
   std::sort(distances.begin(), distances.end());
   if (distances.size() < 2) return "";
-  const bool equal = distances[1].first - distances[0].first < kEqualShare * std::abs(paper);
+  const bool equal = distances[1].first - distances[0].first <= kEqualShare * std::abs(paper);
   return equal ? "" : distances[0].second;
 }
 

@@ -232,7 +232,16 @@ TableCell VerdictCell(const CheckResult& check) {
 
 std::string FormatMeasured(const CheckResult& check) {
   if (!check.measured) return check.known() ? "none" : "not known";
-  const std::string number = FormatNumber(*check.measured, check.unit);
+  std::string number = FormatNumber(*check.measured);
+  // Where a limit is broken by less than is shown, there are as many digits as tell the two apart.
+  for (const std::optional<double>& limit : {check.at_least, check.at_most}) {
+    const bool same = !check.passed && limit && number == FormatNumber(*limit);
+    for (int digits = 5; same && digits <= 17; ++digits) {
+      number = fmt::format("{:.{}g}", *check.measured, digits);
+      if (number != fmt::format("{:.{}g}", *limit, digits)) break;
+    }
+  }
+  if (!check.unit.empty()) number += " " + check.unit;
   return check.joint.empty() ? number : fmt::format("{}, {}", number, check.joint);
 }
 
