@@ -41,11 +41,11 @@ PartialFile* first = nullptr;
 PartialFile::PartialFile(const std::string& path) : path_(path) {
   std::error_code error;
   if (fs::exists(path, error)) {
-    path_ = fs::canonical(path).string();  // a link keeps pointing to it
-    if (!fs::is_regular_file(path_)) {
+    if (!fs::is_regular_file(path)) {
       part_ = path_;
       return;
     }
+    path_ = fs::canonical(path).string();  // a link keeps pointing to it
     if (IsEventLog(path_)) {
       throw LogError(fmt::format("{}: is an event log; choose another file", path));
     }

@@ -44,7 +44,7 @@ void UnitreeEmulator::Configure(const ComponentContext& context, Wiring* wiring)
   try {
     robot_ = std::make_unique<unitree::EmulatedRobot>(config_, *model, context.tick_period);
   } catch (const unitree::UnitreeError& error) {
-    throw ConfigError("", error.what());
+    throw ConfigError(error.what());
   }
   robot_->SetMakerActive(true);
   const MessageCounts counts = JointAndFootCounts(*model);

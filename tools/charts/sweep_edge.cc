@@ -221,10 +221,12 @@ std::vector<std::string> Sentences::OfSweep() const {
   const size_t runs = rows_.size() - untold_;
   if (rows_.empty()) return {"No run is there yet."};
   if (runs == 0) return {};
-  if (standing_ == runs) return {fmt::format("All {} runs stand.", runs)};
+  if (standing_ == runs)
+    return {runs == 1 ? "The one run stands." : fmt::format("All {} runs stand.", runs)};
   if (standing_ == 0) return {fmt::format("None of {} runs stands.", runs)};
-  std::vector<std::string> sentences = {
-      fmt::format("{} of {} runs stand, {} do not.", standing_, runs, runs - standing_)};
+  std::vector<std::string> sentences = {fmt::format("{} of {} runs stand, {} {} not.", standing_,
+                                                    runs, runs - standing_,
+                                                    runs - standing_ == 1 ? "does" : "do")};
   if (!header_.sweep.has_random()) {
     // Survival is told along the number whose values separate the most runs that stand from those
     // that do not: a larger force does, a later push does not.

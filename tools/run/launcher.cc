@@ -290,10 +290,13 @@ void Launcher::Watch() {
                       waited_for.size() == 1 ? "it is" : "they are");
       const int64_t theirs = control_.statuses().at(waited_for.front()).health.tick;
       Fail({RunFault::Kind::kHung, names, what},
-           fmt::format("no tick for {} s: {} {} waited for, {} last word is of tick {}; the others "
-                       "have come to tick {}",
+           fmt::format("no tick for {} s: {} {} waited for{}; the others have come to tick {}",
                        kStallPatience / kSecond, names, waited_for.size() == 1 ? "is" : "are",
-                       waited_for.size() == 1 ? "its" : "their", theirs, tick));
+                       // Health comes a few times a second: the first may be of no tick yet.
+                       theirs < 0 ? ""
+                                  : fmt::format(", {} last word is of tick {}",
+                                                waited_for.size() == 1 ? "its" : "their", theirs),
+                       tick));
       return;
     }
   }

@@ -193,6 +193,12 @@ TEST_F(SweepChartsTest, OfTheLimitOfOnePointEachValueTriedIsARow) {
   EXPECT_EQ(part["rows"][1]["values"], Json::parse("[20.0, null]"));
 }
 
+TEST_F(SweepChartsTest, OneRunIsToldAsOne) {
+  Vary("push_force", "N", {50});
+  Add(true, 1);
+  EXPECT_THAT(SurvivalSentences(header, rows), ElementsAre("The one run stands."));
+}
+
 TEST_F(SweepChartsTest, TheEdgeOfSurvivalInWords) {
   Vary("push_force", "N", {50, 100, 150, 200, 250});
   for (const bool stands : {true, true, false, true, false}) Add(stands, 1);
