@@ -265,6 +265,18 @@ TEST(CommandLine, SaysWhatWasMeant) {
   ExpectUsageError({"run", "--duration", "long"}, {"--duration", "poise run --help"});
 }
 
+TEST(CommandLine, OptionsAreDescribedInOneColumn) {
+  for (const std::vector<std::string>& help :
+       {std::vector<std::string>{"run", "--help"}, {"robot", "import", "--help"}}) {
+    for (const std::string& line : Lines(RunPoise(help).output)) {
+      const bool described = !line.ends_with("...") && !line.ends_with("}");
+      if (line.starts_with("  --") && line.size() > 30 && described) {
+        EXPECT_EQ(line[29], ' ') << line;
+      }
+    }
+  }
+}
+
 TEST(CommandLine, HelpsWhereNothingWasAskedFor) {
   const ProgramResult alone = RunPoise({});
   EXPECT_EQ(alone.exit_code, 2);

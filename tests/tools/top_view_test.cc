@@ -110,6 +110,9 @@ TEST_F(TopViewTest, ShowsTheBridgesState) {
 }
 
 TEST_F(TopViewTest, ShowsAProcess) {
+  EXPECT_THAT(Row("PROCESS"), ElementsAre("PROCESS", "STATE", "TICKS/S", "P99", "us", "LATE",
+                                          "GAPS", "REFUSED", "DROPPED", "RESENT", "UNSENT", "AGE",
+                                          "s", "TICK", "MEDIAN", "us", "MAX", "us"));
   EXPECT_THAT(Row("sim"), ::testing::ElementsAre("sim", "running", "499.8", "565", "7", "11", "22",
                                                  "33", "44", "55", "0.1", "1520", "256", "1278"));
 }

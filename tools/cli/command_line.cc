@@ -82,16 +82,13 @@ std::string UnknownFlag(const CLI::App& root, const CLI::App& command,
 
 /// CLI11 names a checked value by its type and its check, "INT:INT in [1 - 9]": the check says
 /// both.
-std::string WithoutDoubledTypes(const std::string& help) {
+std::string WithoutDoubledTypes(const std::string& text) {
   const std::string single =
-      WithReplaced(help, R"(\b(?:INT|FLOAT|TEXT|PART):((?:INT in|FLOAT in|DIR\b|\{)))", "$1");
+      WithReplaced(text, R"(\b(?:INT|FLOAT|TEXT|PART):((?:INT in|FLOAT in|DIR\b|\{)))", "$1");
   // A flag that switches off is written there with what it sets.
-  return WithReplaced(single, R"((--[\w-]+)\{false\})", "$1");
-}
-
-/// A list of choices may be longer than a line, which breaks where a space is.
-std::string WithSpacesInLists(const std::string& help) {
-  return WithReplaced(help, R"(,(?=[\w,-]*\}))", ", ");
+  const std::string plain = WithReplaced(single, R"((--[\w-]+)\{false\})", "$1");
+  // A list of choices may be longer than a line, which breaks where a space is.
+  return WithReplaced(plain, R"(,(?=[\w,-]*\}))", ", ");
 }
 
 /// "--inline, --hosted".
@@ -105,9 +102,13 @@ std::string FlagNames(const std::set<CLI::Option*>& options) {
 /// An option's meaning first, then what it goes with.
 class HelpFormatter : public CLI::Formatter {
  public:
+  std::string make_option_name(const CLI::Option* option, bool positional) const override {
+    return WithoutDoubledTypes(CLI::Formatter::make_option_name(option, positional));
+  }
   std::string make_option_opts(const CLI::Option* option) const override {
     const std::string text = CLI::Formatter::make_option_opts(option);
-    return text.substr(0, std::min(text.find(" Needs:"), text.find(" Excludes:")));
+    return WithoutDoubledTypes(
+        text.substr(0, std::min(text.find(" Needs:"), text.find(" Excludes:"))));
   }
   std::string make_option_desc(const CLI::Option* option) const override {
     std::string text = option->get_description();
@@ -170,8 +171,7 @@ std::string HelpText(const CLI::App& app) {
   std::string text;
   const CLI::App& command = Named(app);
   const CLI::App* const parent = command.get_parent();
-  const std::string help = WithSpacesInLists(
-      WithoutDoubledTypes(command.help(parent == nullptr ? "" : FullName(*parent))));
+  const std::string help = command.help(parent == nullptr ? "" : FullName(*parent));
   for (size_t begin = 0; begin < help.size();) {
     const size_t end = std::min(help.find('\n', begin), help.size());
     const std::string line = help.substr(begin, end - begin);

@@ -106,7 +106,7 @@ void AddProcesses(const RunSpec& spec, const LiveSnapshot& snapshot, std::vector
   }
   const size_t label = width + 1;
   static constexpr char kRow[] =
-      "{:<{}} {:<8}{:>8}{:>8}{:>6}{:>7}{:>8}{:>8}{:>7}{:>7}{:>7}{:>9}{:>9}{:>10}";
+      "{:<{}} {:<8} {:>7} {:>6} {:>4} {:>4} {:>7} {:>7} {:>6} {:>6} {:>5} {:>6} {:>9} {:>6}";
   lines->push_back(
       {fmt::format(kRow, "PROCESS", width, "STATE", "TICKS/S", "P99 us", "LATE", "GAPS", "REFUSED",
                    "DROPPED", "RESENT", "UNSENT", "AGE s", "TICK", "MEDIAN us", "MAX us"),
