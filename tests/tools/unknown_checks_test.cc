@@ -174,6 +174,7 @@ TEST_F(UnknownChecksTest, AWalkThatGoesOnAtTheEndIsNoStand) {
   spec_.set_tick_period(0.02);
   Stand();
   for (size_t t = 10; t < 20; ++t) truth_[t].foot_wrench[0].force[2] = 0;
+  for (size_t t = 20; t < kTicks; ++t) truth_[t].foot_pose[0].position[0] = 0.1;
   EXPECT_THAT(Tell(), HasSubstr("stood to the end"));
   for (size_t t = 90; t < kTicks; ++t) truth_[t].foot_wrench[1].force[2] = 0;
   EXPECT_THAT(Tell(), HasSubstr("and did not fall to the end"));
