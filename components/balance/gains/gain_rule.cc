@@ -10,9 +10,12 @@
 namespace poise::balance {
 namespace {
 
-constexpr double kStiffness = 2.75;     // times ω: stiffer than the fall that it stops
-constexpr double kDamping = 0.7;        // of the COM and the body
-constexpr double kPhase = 1.0 / 3;      // rad at k_d that the loop's delay may cost
+constexpr double kStiffness = 2.75;  // times ω: stiffer than the fall that it stops
+constexpr double kDamping = 0.7;     // of the COM and the body
+constexpr double kPhase = 1.0 / 3;   // rad at k_d that the loop's delay may cost
+// Likewise of a foot in the air, which holds nothing up and has a third of a second to come down.
+// As soft as the rest it comes down beside its foothold (docs/lab/steps).
+constexpr double kFootStiffness = 4, kFootPhase = 0.7;
 constexpr double kHorizon = 3;          // of the loop's delay: with a third it would ring
 constexpr double kVelocityCutoff = 20;  // Hz
 // The cutoff is this share of the lowest frequency at which a rotor rings on its gear: a
@@ -64,14 +67,15 @@ StandingGains GainsByRule(const robot::RobotModel& model, double period) {
   StandingGains gains;
   gains.velocity_cutoff = VelocityCutoff(model);
   gains.base_velocity_cutoff = gains.velocity_cutoff;  // both parts of a velocity lag alike
-  const double omega = kStiffness * PendulumFrequency(model);
-  const double most = kPhase / LoopDelay(model, gains.velocity_cutoff, period);  // of k_d
-  const auto of = [&](double damping) {
-    const double frequency = std::min(omega, most / (2 * damping));
+  const double omega = PendulumFrequency(model);
+  const double delay = LoopDelay(model, gains.velocity_cutoff, period);
+  const auto of = [&](double stiffness, double damping, double phase) {
+    const double frequency = std::min(stiffness * omega, phase / delay / (2 * damping));
     return TaskGains{frequency * frequency, 2 * damping * frequency};
   };
-  gains.com = gains.orientation = of(kDamping);
-  gains.foot = gains.posture = of(1);
+  gains.com = gains.orientation = of(kStiffness, kDamping, kPhase);
+  gains.posture = of(kStiffness, 1, kPhase);
+  gains.foot = of(kFootStiffness, 1, kFootPhase);
   return gains;
 }
 
