@@ -35,8 +35,9 @@ std::optional<Eigen::Vector2d> Place(const RunRecord& run, size_t foot, int64_t 
   return Eigen::Vector2d(position[0], position[1]);
 }
 
-/// A sole that comes down elsewhere than it stood.
+/// A sole that comes down elsewhere than it stood, or that has stood nowhere yet.
 bool Moves(const RunRecord& run, const TrueStep& step) {
+  if (step.lifted <= run.spec.lead_ticks()) return true;
   const auto from = Place(run, step.foot, step.lifted), to = Place(run, step.foot, step.landed);
   return !from || !to || (*to - *from).norm() >= kWay;
 }

@@ -16,7 +16,8 @@ std::array<std::vector<Interval>, 2> OffTheGround(const RunRecord& run);
 
 /// A foot that left the ground and carries again, at least 50 mm from where it stood, or in turn
 /// with the other foot, three times at least, each at most 1 s after the one before: a robot that
-/// rocks, and a sole that soft ground throws off, make no step.
+/// rocks, and a sole that soft ground throws off, make no step. A foot that has been in the air
+/// from the start steps wherever it comes down.
 struct TrueStep {
   size_t foot = 0;
   int64_t lifted = 0, landed = 0;  ///< ticks, of the scenario's time
