@@ -16,9 +16,9 @@ using stepping::TransitionKind;
 /// What holds a phase back.
 enum class WaitingFor : int8_t {
   kNothing = planner_status_t::WAITING_NONE,
-  /// For the capture point above the stance sole, before unloading or lift-off.
+  /// The capture point is to be above the stance sole, before unloading or lift-off.
   kCom = planner_status_t::WAITING_COM,
-  /// Of the foot that comes down, before double support.
+  /// The foot that comes down is to be a contact, before double support.
   kContact = planner_status_t::WAITING_CONTACT,
 };
 

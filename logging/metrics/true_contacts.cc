@@ -72,8 +72,9 @@ class Stance {
     double height = ComHeight(truth);
     // Feet in the air, which a robot may pull up in a leap, do not tell where the ground is.
     if (std::ranges::all_of(truth.foot_wrench,
-                            [&](const wrench_t& w) { return -w.force[2] < least_; }))
+                            [&](const wrench_t& w) { return -w.force[2] < least_; })) {
       height = std::max(height, truth.com_position[2] - ground_);
+    }
     return Up(truth).dot(up_) < std::cos(kDownTilt) || height < kDownShare * height_;
   }
 
