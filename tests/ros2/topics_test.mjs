@@ -115,6 +115,7 @@ const close = (a, b, tolerance, text) => a.forEach((x, i) => assert.ok(Math.abs(
 test('joint states, byte by byte by the rules of CDR', () => {
   const state = byTime('ROBOT_STATE'), sensors = byTime('ROBOT_SENSORS');
   assert.ok(seen['rt/joint_states'].length >= LEAST, `${seen['rt/joint_states'].length}`);
+  let withTorques = 0;
   for (const bytes of seen['rt/joint_states']) {
     assert.deepEqual([...bytes.subarray(0, 2)], [0, 1]);  // plain CDR, little-endian
     const body = bytes.subarray(4);
@@ -130,9 +131,13 @@ test('joint states, byte by byte by the rules of CDR', () => {
     assert.deepEqual(names, Object.keys(q));
     assert.deepEqual(numbers(), Object.values(q));
     assert.deepEqual(numbers(), Object.values(v));
-    assert.deepEqual(numbers(), Object.values(sensors.get(time).joint_torque));
+    const torques = numbers();
+    // A busy machine may lose the sensors' datagram of a tick; then its torques are not known.
+    if (torques.length > 0) assert.deepEqual(torques, Object.values(sensors.get(time).joint_torque));
+    withTorques += torques.length > 0;
     assert.ok(body.length - at < 4);  // RTPS fills up to a multiple of four
   }
+  assert.ok(withTorques >= LEAST / 2, `${withTorques} of ${seen['rt/joint_states'].length}`);
 });
 
 test('odometry: the estimate, its twist in the base\'s axes', () => {
