@@ -213,6 +213,22 @@ TEST(StepBalance, WithTheLegsAloneAllOtherJointsKeepTheirAccelerations) {
   }
 }
 
+TEST(StepBalance, WithTheLegsAloneWeakArmsChangeNothing) {
+  const auto model = Humanoid();
+  StateSampler sampler(model, 77);
+  for (const auto& in_contact : kContacts) {
+    Case c(model, sampler.Draw(), in_contact);
+    ASSERT_TRUE(c.ok);
+    const Eigen::VectorXd wanted = sampler.Vector(model->num_joints(), 100);
+    Eigen::VectorXd strong = wanted, weak = wanted;
+    ASSERT_TRUE(c.Compute(&strong, Movers::kLegs));
+    c.effort.setConstant(1e-3);
+    for (const int j : c.body.contact().legs()) c.effort[j] = 1e5;
+    ASSERT_TRUE(c.Compute(&weak, Movers::kLegs));
+    EXPECT_EQ((weak - strong).norm(), 0);
+  }
+}
+
 TEST(StepBalance, TorquesStayWithinTheJointsLimits) {
   const auto model = Biped();
   StateSampler sampler(model, 76);

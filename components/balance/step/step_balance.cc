@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <span>
 
 #include "components/balance/contact_conditions.h"
@@ -39,7 +40,9 @@ Vector6d EdgeRow(std::span<const Eigen::Vector2d> corners, size_t i) {
 
 }  // namespace
 
-StepBalance::StepBalance(int num_joints, int most_held) : num_joints_(num_joints), lcp_(kMostMet) {
+StepBalance::StepBalance(int num_joints, int most_held)
+    : num_joints_(num_joints), all_joints_(static_cast<size_t>(num_joints)), lcp_(kMostMet) {
+  std::iota(all_joints_.begin(), all_joints_.end(), 0);
   const Index k = num_joints;
   const Index most = 2 * kMostSole + ConvexPolygon::kMaxCorners + 2 * k;
   torque_of_ = Eigen::MatrixXd::Zero(k, k);
@@ -171,8 +174,9 @@ void StepBalance::AddRegion(const StepBounds& bounds) {
   }
 }
 
-void StepBalance::AddTorques(const VectorRef& effort, const VectorRef& torque) {
-  for (Index j = 0; j < num_joints_; ++j) {
+void StepBalance::AddTorques(std::span<const int> joints, const VectorRef& effort,
+                             const VectorRef& torque) {
+  for (const int j : joints) {
     for (const double side : {1.0, -1.0}) {
       bound_.col(bounds_).head(coordinates_) =
           side * torque_of_.row(j).head(coordinates_).transpose();
@@ -251,7 +255,9 @@ bool StepBalance::Compute(const ContactDynamics& contact, const StepBounds& boun
     row += 6;
   }
   AddRegion(bounds);
-  AddTorques(effort, torque);
+  // What legs cannot give is none of their bounds: they would throw the robot to spare an arm that
+  // was struck.
+  AddTorques(movers == Movers::kLegs ? contact.legs() : all_joints_, effort, torque);
   result->wrench = result->task;
   result->changed = false;
   if (!Solve()) return false;

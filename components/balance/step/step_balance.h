@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <array>
+#include <span>
 #include <vector>
 
 #include "components/balance/balance_control.h"
@@ -62,8 +63,9 @@ class StepBalance {
     bool changed = false;
   };
   /// `contact` at the state and contacts of `bounds`, `effort` the joints' torque limits (k×1, N·m,
-  /// > 0). With kLegs all joints that are no leg's keep the accelerations of `torque`. False, and
-  /// the torque (k×1) as it was, where sizes are wrong or something is not finite.
+  /// > 0). With kLegs all joints that are no leg's keep the accelerations of `torque`, and their
+  /// limits do not count. False, and the torque (k×1) as it was, where sizes are wrong or something
+  /// is not finite.
   bool Compute(const ContactDynamics& contact, const StepBounds& bounds, const HeldMotion& held,
                const VectorRef& effort, Movers movers, Eigen::Ref<Eigen::VectorXd> torque,
                Result* result);
@@ -74,13 +76,14 @@ class StepBalance {
   void Hold(const ContactDynamics& contact, const HeldMotion& held, Eigen::Index coordinates);
   void AddSole(const SoleBounds& bounds, Eigen::Index row);
   void AddRegion(const StepBounds& bounds);
-  void AddTorques(const VectorRef& effort, const VectorRef& torque);
+  void AddTorques(std::span<const int> joints, const VectorRef& effort, const VectorRef& torque);
   /// a · F ≤ room for the contact wrenches F (12×1, or 6×1).
   void AddWrench(const Eigen::Matrix<double, 12, 1>& a, double room);
   /// The change within the bounds, into `step_`. False: not found.
   bool Solve();
 
   int num_joints_;
+  std::vector<int> all_joints_;
   Eigen::Index coordinates_ = 0, wrench_rows_ = 0, bounds_ = 0;
   Eigen::MatrixXd torque_of_, wrench_of_;  // by coordinate, k×n, m×n
   Eigen::MatrixXd metric_;                 // n×n; its Cholesky factor once it is solved with
