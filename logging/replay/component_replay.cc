@@ -1,18 +1,22 @@
 #include "logging/replay/component_replay.h"
 
 #include <algorithm>
+#include <limits>
 #include <set>
+#include <span>
 
 #include "components/framework/bus/owned_message.h"
 #include "components/framework/clock.h"
 #include "components/framework/graph.h"
 #include "components/framework/operator_acts.h"
 #include "components/framework/run.h"
+#include "components/framework/runners/timing.h"
 #include "fmt/format.h"
 #include "logging/element_names.h"
 #include "logging/replay/message_difference.h"
 #include "logging/run_log_writer.h"
 #include "logging/run_record.h"
+#include "poise/bridge_status_t.hpp"
 
 namespace poise::logging {
 namespace {
@@ -55,13 +59,15 @@ LogReplay::LogReplay(const std::string& path) : path_(path), messages_(path) {
   std::map<std::string, size_t, std::less<>> index;
   for (const Channel& channel : spec().graph().channel()) {
     index[channel.name()] = lanes_.size();
-    lanes_.push_back(
-        {ChannelTicks(spec(), channel, messages_.reader().file_size()), &ChannelType(channel), {}});
+    lanes_.push_back({ChannelTicks(spec(), channel, messages_.reader().file_size()),
+                      &ChannelType(channel),
+                      {},
+                      {}});
   }
   external_.resize(lanes_.size());
   LogEvent event;
   int64_t newest = -1;
-  while (messages_.reader().Next(&event)) {
+  for (int64_t place = 0; messages_.reader().Next(&event); ++place) {
     const auto found = index.find(event.channel);
     if (found == index.end()) continue;
     const auto i = static_cast<int>(found->second);
@@ -77,6 +83,7 @@ LogReplay::LogReplay(const std::string& path) : path_(path), messages_(path) {
     lane.ticks.Take(*tick);
     newest = std::max(newest, *tick);
     lane.by_tick.Set(*tick, event.data);
+    lane.place.Set(*tick, place);
   }
 }
 
@@ -86,7 +93,11 @@ class ReplayedStages {
   ReplayedStages(const LogReplay& log, const RunSpec& spec, int index,
                  const ComponentRegistry& registry, ChangedMessages* changed,
                  const OnStages& on_stages)
-      : log_(log), spec_(spec), instance_(spec.graph().component(index)), changed_(changed) {
+      : log_(log),
+        spec_(spec),
+        instance_(spec.graph().component(index)),
+        changed_(changed),
+        timing_(poise::TimingOf(spec, index)) {
     const ComponentFactory* const factory = registry.Find(poise::TypeOf(instance_));
     if (factory == nullptr) {
       Fail(fmt::format("this program has no component type '{}'", poise::TypeOf(instance_)));
@@ -107,10 +118,15 @@ class ReplayedStages {
     const int64_t start = NowNanoseconds();
     size_t next_act = 0;
     for (int64_t t = 0; t < end_; ++t) {
+      if (timing_ == poise::Timing::kFollower && !Ran(t)) {
+        ++result_.skipped_ticks;
+        continue;
+      }
       for (; next_act < placed_acts_.size() && placed_acts_[next_act].tick <= t; ++next_act) {
         act_input_->Place(placed_acts_[next_act].act, t);
       }
-      const Tick tick = MakeTick(t, spec_.tick_period(), spec_.lead_ticks());
+      Tick tick = MakeTick(t, spec_.tick_period(), spec_.lead_ticks());
+      tick.lateness = Lateness(t);
       position_->tick.store(t, std::memory_order_relaxed);
       for (BoundStage& stage : stages_) {
         if (t < stage.end) RunStage(&stage, tick);
@@ -128,6 +144,7 @@ class ReplayedStages {
     std::vector<ExternalMessage> external;  // of kLatest
     size_t next_external = 0;
     bool present = false;
+    int64_t shown = -1;  // tick of the newest that was shown
   };
   struct Output {
     OutputPort* port;
@@ -266,6 +283,11 @@ class ReplayedStages {
   void CheckLog() {
     std::vector<std::string> lacking;
     if (end_ == 0) lacking.push_back("the log holds no message of its outputs");
+    // What was late is part of the run.
+    if (end_ > 0 && (timing_ == poise::Timing::kOwner || timing_ == poise::Timing::kFollower)) {
+      for (BoundStage& stage : stages_) stage.end = end_;
+      return;
+    }
     std::set<int> named;
     for (BoundStage& stage : stages_) {
       // The recording may have ended inside the last tick.
@@ -311,8 +333,86 @@ class ReplayedStages {
                     : ""));
   }
 
+  /// Whether a follower ran in a tick: the log has something it sent then, and all that it read.
+  bool Ran(int64_t tick) const {
+    const auto has = [&](int channel, int64_t of) {
+      return channel >= 0 && lane(channel).by_tick.at(of) != nullptr;
+    };
+    bool sent = false;
+    for (const BoundStage& stage : stages_) {
+      for (const Output& output : stage.outputs) sent = sent || has(output.channel, tick);
+      for (const Input& input : stage.inputs) {
+        if (input.port->kind() == InputKind::kLatest) continue;
+        const int64_t of = input.port->kind() == InputKind::kPreviousTick ? tick - 1 : tick;
+        if (of >= 0 && !has(input.channel, of)) return false;
+      }
+    }
+    return sent;
+  }
+
+  /// What the component says of the tick, if it is a bridge.
+  std::optional<bridge_status_t> BridgeStatus(int64_t tick) const {
+    for (const BoundStage& stage : stages_) {
+      for (const Output& output : stage.outputs) {
+        bridge_status_t status;
+        if (output.channel >= 0 &&
+            lane(output.channel).type == FindMessageType("bridge_status_t") &&
+            DecodeChecked(Logged(output.channel, tick), &status)) {
+          return status;
+        }
+      }
+    }
+    return {};
+  }
+
+  /// s by which the tick began too late.
+  double Lateness(int64_t tick) const {
+    const auto status = BridgeStatus(tick);
+    return status ? status->lateness : 0;
+  }
+
+  /// Whether a bridge's cycle had no command that it took or refused.
+  bool WithoutCommand(const Input& input, int64_t tick) const {
+    if (lane(input.channel).type != FindMessageType("joint_command_t")) return false;
+    const auto now = BridgeStatus(tick);
+    const auto refused = [](const bridge_status_t& status) {
+      return status.refused_not_finite + status.refused_stale + status.refused_sequence +
+             status.refused_size + status.refused_run;
+    };
+    const auto before = BridgeStatus(tick - 1);
+    return now && now->command_age > 0 && refused(*now) == (before ? refused(*before) : 0);
+  }
+
+  /// The place in the log of what the stage sent in a tick; of a stage that sends nothing, or did
+  /// not, that of the component's next message.
+  int64_t PlaceOf(const BoundStage& stage, int64_t tick) const {
+    int64_t place = std::numeric_limits<int64_t>::max();
+    const auto consider = [&](const BoundStage& of) {
+      for (const Output& output : of.outputs) {
+        const int64_t* const at =
+            output.channel < 0 ? nullptr : lane(output.channel).place.at(tick);
+        if (at != nullptr) place = std::min(place, *at);
+      }
+    };
+    for (const BoundStage& of : std::span(&stage, stages_.data() + stages_.size())) {
+      consider(of);
+      if (place != std::numeric_limits<int64_t>::max()) break;
+    }
+    return place;
+  }
+
+  /// The newest tick up to `wanted`, of those an inbox holds, whose message had come and was not
+  /// shown yet; -1: none had.
+  int64_t NewestBefore(const Input& input, int64_t wanted, int64_t place) const {
+    for (int64_t t = wanted; t > std::max(input.shown, wanted - kReceiveWindow); --t) {
+      const int64_t* const at = lane(input.channel).place.at(t);
+      if (at != nullptr && *at < place) return t;
+    }
+    return -1;
+  }
+
   /// Shows an input the message it had in the run.
-  void Show(Input* input, int64_t tick) {
+  void Show(const BoundStage& stage, Input* input, int64_t tick) {
     const InputKind kind = input->port->kind();
     if (kind == InputKind::kLatest) {
       while (input->next_external < input->external.size() &&
@@ -323,7 +423,14 @@ class ReplayedStages {
         input->present = Decode(input, message.data) || input->present;
       }
     } else {
-      const int64_t wanted = kind == InputKind::kPreviousTick ? tick - 1 : tick;
+      int64_t wanted = kind == InputKind::kPreviousTick ? tick - 1 : tick;
+      if (timing_ == poise::Timing::kOwner && wanted >= 0) {
+        const int64_t newest =
+            WithoutCommand(*input, tick) ? -1 : NewestBefore(*input, wanted, PlaceOf(stage, tick));
+        result_.late_inputs += newest != wanted ? 1 : 0;
+        wanted = newest;
+        input->shown = std::max(input->shown, newest);
+      }
       input->present = wanted >= 0;
       if (input->present && !Decode(input, Logged(input->channel, wanted))) {
         Fail(fmt::format("{} of tick {} is not finite",
@@ -339,7 +446,7 @@ class ReplayedStages {
   }
 
   void RunStage(BoundStage* stage, const Tick& tick) {
-    for (Input& input : stage->inputs) Show(&input, tick.index);
+    for (Input& input : stage->inputs) Show(*stage, &input, tick.index);
     for (const Output& output : stage->outputs) {
       output.port->Stamp(spec_.run_id(), tick.index, tick.utime);
     }
@@ -354,6 +461,7 @@ class ReplayedStages {
       output.port->Encode(buffer_.data(), static_cast<int>(size));
       ReplayedChannel& channel = result_.outputs[output.result];
       const std::span<const uint8_t> logged = Logged(output.channel, tick.index);
+      if (logged.empty()) continue;  // in real time what a stage was too late for
       ++channel.ticks;
       if (!SameBits(*lane(output.channel).type, logged, buffer_)) {
         AddDifferences(*lane(output.channel).type, logged, buffer_, tick.index, &channel);
@@ -386,6 +494,7 @@ class ReplayedStages {
   std::vector<BoundStage> stages_;
   RunPosition own_position_;
   RunPosition* position_ = &own_position_;
+  poise::Timing timing_;
   int64_t end_ = 0;
   std::vector<uint8_t> buffer_;
   ReplayedComponent result_;

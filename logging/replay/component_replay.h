@@ -50,6 +50,9 @@ struct ReplayedComponent {
   /// they were shown from the tick after those logged before them.
   int64_t external_messages = 0;
   int64_t unplaced_messages = 0;
+  /// Of a run in real time: ticks that a follower was too late for, as the log has nothing that it
+  /// sent or read in them; and inputs that came too late for the clock's owner, by the log's order.
+  int64_t skipped_ticks = 0, late_inputs = 0;
   bool equal() const;
 };
 
@@ -71,7 +74,9 @@ class LogReplay {
   const run_info_t& info() const { return messages_.info(); }
 
   /// Runs component `index` of `spec` (the log's, or one with other configurations) from tick 0 to
-  /// its last logged output. Throws LogError naming channels and ticks that the log lacks for that;
+  /// its last logged output. Of a run in real time followers run in the ticks that the log has
+  /// their messages of, and the clock's owner in all, with the messages that stand in the log
+  /// before its own; else it throws LogError naming channels and ticks that the log lacks. Throws
   /// ConfigError or GraphError from the component. What differs is added to `changed`, unless that
   /// is nullptr. `on_stages` may be empty.
   ReplayedComponent Replay(const RunSpec& spec, int index, const ComponentRegistry& registry,
@@ -87,6 +92,7 @@ class LogReplay {
     ChannelTicks ticks;
     const MessageType* type;
     Series<std::span<const uint8_t>> by_tick;  // into the reader's file
+    Series<int64_t> place;                     // among all the log's messages
   };
   friend class ReplayedStages;
 

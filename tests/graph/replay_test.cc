@@ -183,6 +183,30 @@ TEST_F(ReplayTest, OneChangedBitShowsWithItsFieldAndTick) {
   EXPECT_EQ(Replay({"--component", "state_estimator"}, log).exit_code, 0);
 }
 
+TEST_F(ReplayTest, InRealTimeATickWithoutOutputWasNotRun) {
+  Run({"--inline", "--realtime"});
+  // The task controller keeps nothing from tick to tick here.
+  const std::string log = Changed([](const logging::LogEvent& event, std::vector<uint8_t>*) {
+    return event.channel != "TASK_TORQUE" || event.utime < 20'000 || event.utime > 24'000;
+  });
+  const ProgramResult late = Replay({"--component", "task_controller"}, log);
+  EXPECT_EQ(late.exit_code, 0) << late.output;
+  EXPECT_HAS(late, "too late for 3 ticks, and 0 of its inputs");
+  const ProgramResult reader = Replay({"--component", "contact_wrench_monitor"}, log);
+  EXPECT_HAS(reader, "too late for 3 ticks, and 0 of its inputs");
+}
+
+TEST_F(ReplayTest, InRealTimeTheBridgeGoesOnWithoutACommand) {
+  Run({"--inline", "--realtime"});
+  const std::string log = Changed([](const logging::LogEvent& event, std::vector<uint8_t>*) {
+    return event.channel != "JOINT_COMMAND" || event.utime < 20'000 || event.utime > 24'000;
+  });
+  const ProgramResult result = Replay({"--component", "hw_bridge"}, log);
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  EXPECT_HAS(result, "too late for 0 ticks, and 3 of its inputs");
+  EXPECT_HAS(result, "ROBOT_SENSORS");
+}
+
 TEST_F(ReplayTest, NamesWhatTheLogLacks) {
   Run({"--inline"});
   const std::string log = Changed([](const logging::LogEvent& event, std::vector<uint8_t>*) {

@@ -83,6 +83,12 @@ void Print(const logging::ReplayedComponent& component, const logging::LogMessag
         "only between which they came; differences after them may come of that\n",
         component.unplaced_messages, component.external_messages);
   }
+  if (component.skipped_ticks > 0 || component.late_inputs > 0) {
+    fmt::print(
+        "  in real time it was too late for {} ticks, and {} of its inputs too late for it, by the "
+        "log's order; differences may come of that\n",
+        component.skipped_ticks, component.late_inputs);
+  }
   for (const logging::ReplayedChannel& output : component.outputs) {
     if (output.ticks == 0) {
       fmt::print("  {}: nothing to compare with: this run had no such channel\n",
