@@ -16,7 +16,6 @@
 #include "logging/replay/message_difference.h"
 #include "logging/run_log_writer.h"
 #include "logging/run_record.h"
-#include "poise/bridge_status_t.hpp"
 
 namespace poise::logging {
 namespace {
@@ -104,6 +103,12 @@ class ReplayedStages {
     }
     component_ = ConfigureComponent(spec, index, *factory, &shared_);
     CheckWiring(spec.graph(), index, component_.wiring);
+    for (const OutputPort* output : component_.wiring.outputs()) {
+      const int channel = ChannelOf(instance_.output(), output->name());
+      if (channel >= 0 && lane(channel).type == FindMessageType("bridge_status_t")) {
+        status_ = channel;
+      }
+    }
     for (const Stage& stage : component_.wiring.stages()) Bind(stage);
     CheckLog();
     if (!on_stages) return;
@@ -126,7 +131,9 @@ class ReplayedStages {
         act_input_->Place(placed_acts_[next_act].act, t);
       }
       Tick tick = MakeTick(t, spec_.tick_period(), spec_.lead_ticks());
-      tick.lateness = Lateness(t);
+      if (timing_ == poise::Timing::kOwner) {
+        if (const auto status = BridgeStatus(t)) tick.lateness = status->lateness;
+      }
       position_->tick.store(t, std::memory_order_relaxed);
       for (BoundStage& stage : stages_) {
         if (t < stage.end) RunStage(&stage, tick);
@@ -263,12 +270,7 @@ class ReplayedStages {
     if (port->kind() != InputKind::kLatest) return {};
     std::vector<ExternalMessage> messages = log_.external_[static_cast<size_t>(channel)];
     if (lane(channel).type != FindMessageType("emergency_stop_t")) return messages;
-    for (const OutputPort* output : component_.wiring.outputs()) {
-      const int status = ChannelOf(instance_.output(), output->name());
-      if (status >= 0 && lane(status).type == FindMessageType("bridge_status_t")) {
-        PlaceEmergencyStops(lane(status).by_tick, &messages);
-      }
-    }
+    if (status_ >= 0) PlaceEmergencyStops(lane(status_).by_tick, &messages);
     return messages;
   }
 
@@ -333,6 +335,11 @@ class ReplayedStages {
                     : ""));
   }
 
+  /// The tick whose message an input has in lockstep.
+  static int64_t TickOf(const Input& input, int64_t tick) {
+    return input.port->kind() == InputKind::kPreviousTick ? tick - 1 : tick;
+  }
+
   /// Whether a follower ran in a tick: the log has something it sent then, and all that it read.
   bool Ran(int64_t tick) const {
     const auto has = [&](int channel, int64_t of) {
@@ -343,7 +350,7 @@ class ReplayedStages {
       for (const Output& output : stage.outputs) sent = sent || has(output.channel, tick);
       for (const Input& input : stage.inputs) {
         if (input.port->kind() == InputKind::kLatest) continue;
-        const int64_t of = input.port->kind() == InputKind::kPreviousTick ? tick - 1 : tick;
+        const int64_t of = TickOf(input, tick);
         if (of >= 0 && !has(input.channel, of)) return false;
       }
     }
@@ -352,23 +359,7 @@ class ReplayedStages {
 
   /// What the component says of the tick, if it is a bridge.
   std::optional<bridge_status_t> BridgeStatus(int64_t tick) const {
-    for (const BoundStage& stage : stages_) {
-      for (const Output& output : stage.outputs) {
-        bridge_status_t status;
-        if (output.channel >= 0 &&
-            lane(output.channel).type == FindMessageType("bridge_status_t") &&
-            DecodeChecked(Logged(output.channel, tick), &status)) {
-          return status;
-        }
-      }
-    }
-    return {};
-  }
-
-  /// s by which the tick began too late.
-  double Lateness(int64_t tick) const {
-    const auto status = BridgeStatus(tick);
-    return status ? status->lateness : 0;
+    return status_ < 0 ? std::nullopt : StatusAt(lane(status_).by_tick, tick);
   }
 
   /// Whether a bridge's cycle had no command that it took or refused.
@@ -383,22 +374,15 @@ class ReplayedStages {
     return now && now->command_age > 0 && refused(*now) == (before ? refused(*before) : 0);
   }
 
-  /// The place in the log of what the stage sent in a tick; of a stage that sends nothing, or did
-  /// not, that of the component's next message.
+  /// The place in the log of the first message that the stage, or one after it, sent in a tick.
   int64_t PlaceOf(const BoundStage& stage, int64_t tick) const {
-    int64_t place = std::numeric_limits<int64_t>::max();
-    const auto consider = [&](const BoundStage& of) {
-      for (const Output& output : of.outputs) {
-        const int64_t* const at =
-            output.channel < 0 ? nullptr : lane(output.channel).place.at(tick);
-        if (at != nullptr) place = std::min(place, *at);
-      }
-    };
     for (const BoundStage& of : std::span(&stage, stages_.data() + stages_.size())) {
-      consider(of);
-      if (place != std::numeric_limits<int64_t>::max()) break;
+      for (const Output& output : of.outputs) {
+        if (output.channel < 0) continue;
+        if (const int64_t* const at = lane(output.channel).place.at(tick)) return *at;
+      }
     }
-    return place;
+    return std::numeric_limits<int64_t>::max();
   }
 
   /// The newest tick up to `wanted`, of those an inbox holds, whose message had come and was not
@@ -423,7 +407,7 @@ class ReplayedStages {
         input->present = Decode(input, message.data) || input->present;
       }
     } else {
-      int64_t wanted = kind == InputKind::kPreviousTick ? tick - 1 : tick;
+      int64_t wanted = TickOf(*input, tick);
       if (timing_ == poise::Timing::kOwner && wanted >= 0) {
         const int64_t newest =
             WithoutCommand(*input, tick) ? -1 : NewestBefore(*input, wanted, PlaceOf(stage, tick));
@@ -495,6 +479,7 @@ class ReplayedStages {
   RunPosition own_position_;
   RunPosition* position_ = &own_position_;
   poise::Timing timing_;
+  int status_ = -1;  // channel of what a bridge says of itself; -1: the component is none
   int64_t end_ = 0;
   std::vector<uint8_t> buffer_;
   ReplayedComponent result_;

@@ -50,8 +50,9 @@ struct ReplayedComponent {
   /// they were shown from the tick after those logged before them.
   int64_t external_messages = 0;
   int64_t unplaced_messages = 0;
-  /// Of a run in real time: ticks that a follower was too late for, as the log has nothing that it
-  /// sent or read in them; and inputs that came too late for the clock's owner, by the log's order.
+  /// These count what was late in real time: ticks that a follower did not run, as the log lacks
+  /// what it sent or read in them, and inputs that the clock's owner did without, by the log's
+  /// order.
   int64_t skipped_ticks = 0, late_inputs = 0;
   bool equal() const;
 };

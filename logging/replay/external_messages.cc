@@ -5,7 +5,6 @@
 #include <optional>
 
 #include "components/framework/run.h"
-#include "poise/bridge_status_t.hpp"
 #include "poise/emergency_stop_t.hpp"
 #include "poise/message_traits.hpp"
 
@@ -21,11 +20,6 @@ std::optional<T> Decode(std::span<const uint8_t> data) {
   T message;
   if (!DecodeChecked(data, &message)) return {};
   return message;
-}
-
-std::optional<bridge_status_t> StatusAt(const Statuses& statuses, int64_t tick) {
-  const std::span<const uint8_t>* const data = statuses.at(tick);
-  return data == nullptr ? std::nullopt : Decode<bridge_status_t>(*data);
 }
 
 /// The tick nearest to `near`, and not before `first`, of whose status and the one before it
@@ -63,6 +57,12 @@ bool Reset(const bridge_status_t* before, const bridge_status_t& now) {
 }
 
 }  // namespace
+
+std::optional<bridge_status_t> StatusAt(const Series<std::span<const uint8_t>>& statuses,
+                                        int64_t tick) {
+  const std::span<const uint8_t>* const data = statuses.at(tick);
+  return data == nullptr ? std::nullopt : Decode<bridge_status_t>(*data);
+}
 
 void PlaceEmergencyStops(const Statuses& statuses, std::vector<ExternalMessage>* stops) {
   bool stop = false;

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "logging/tick_series.h"
+#include "poise/bridge_status_t.hpp"
 
 namespace poise::logging {
 
@@ -14,6 +16,10 @@ struct ExternalMessage {
   bool certain = false;  ///< the log tells that tick, or it makes no difference
   std::span<const uint8_t> data;
 };
+
+/// The message of a tick; none where the log has none, or it is not decodable.
+std::optional<bridge_status_t> StatusAt(const Series<std::span<const uint8_t>>& statuses,
+                                        int64_t tick);
 
 /// Sets the ticks of `stops` (emergency_stop_t, in order) from the `statuses` (bridge_status_t by
 /// tick) of the bridge that read them: a stop is read in the tick in which the state becomes

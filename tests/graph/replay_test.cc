@@ -50,6 +50,12 @@ class ReplayTest : public testing::Test {
     writer.Close();
     return path;
   }
+  /// The run's log without three ticks of a channel, 10 to 12.
+  std::string Without(std::string_view channel) {
+    return Changed([channel](const logging::LogEvent& event, std::vector<uint8_t>*) {
+      return event.channel != channel || event.utime < 20'000 || event.utime > 24'000;
+    });
+  }
 
   RunFolder folder_;
   std::string run_ = folder_ / "run";
@@ -186,9 +192,7 @@ TEST_F(ReplayTest, OneChangedBitShowsWithItsFieldAndTick) {
 TEST_F(ReplayTest, InRealTimeATickWithoutOutputWasNotRun) {
   Run({"--inline", "--realtime"});
   // The task controller keeps nothing from tick to tick here.
-  const std::string log = Changed([](const logging::LogEvent& event, std::vector<uint8_t>*) {
-    return event.channel != "TASK_TORQUE" || event.utime < 20'000 || event.utime > 24'000;
-  });
+  const std::string log = Without("TASK_TORQUE");
   const ProgramResult late = Replay({"--component", "task_controller"}, log);
   EXPECT_EQ(late.exit_code, 0) << late.output;
   EXPECT_HAS(late, "too late for 3 ticks, and 0 of its inputs");
@@ -198,9 +202,7 @@ TEST_F(ReplayTest, InRealTimeATickWithoutOutputWasNotRun) {
 
 TEST_F(ReplayTest, InRealTimeTheBridgeGoesOnWithoutACommand) {
   Run({"--inline", "--realtime"});
-  const std::string log = Changed([](const logging::LogEvent& event, std::vector<uint8_t>*) {
-    return event.channel != "JOINT_COMMAND" || event.utime < 20'000 || event.utime > 24'000;
-  });
+  const std::string log = Without("JOINT_COMMAND");
   const ProgramResult result = Replay({"--component", "hw_bridge"}, log);
   EXPECT_EQ(result.exit_code, 1) << result.output;
   EXPECT_HAS(result, "too late for 0 ticks, and 3 of its inputs");
@@ -209,9 +211,7 @@ TEST_F(ReplayTest, InRealTimeTheBridgeGoesOnWithoutACommand) {
 
 TEST_F(ReplayTest, NamesWhatTheLogLacks) {
   Run({"--inline"});
-  const std::string log = Changed([](const logging::LogEvent& event, std::vector<uint8_t>*) {
-    return event.channel != "ROBOT_STATE" || event.utime < 20'000 || event.utime > 24'000;
-  });
+  const std::string log = Without("ROBOT_STATE");
   const ProgramResult result = Replay({"--component", "redistributor"}, log);
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_HAS(result, "redistributor cannot be replayed");

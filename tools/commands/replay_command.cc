@@ -85,7 +85,7 @@ void Print(const logging::ReplayedComponent& component, const logging::LogMessag
   }
   if (component.skipped_ticks > 0 || component.late_inputs > 0) {
     fmt::print(
-        "  in real time it was too late for {} ticks, and {} of its inputs too late for it, by the "
+        "  in real time it was too late for {} ticks, and {} of its inputs came too late by the "
         "log's order; differences may come of that\n",
         component.skipped_ticks, component.late_inputs);
   }

@@ -13,8 +13,8 @@ namespace {
 constexpr double kStiffness = 2.75;  // times ω: stiffer than the fall that it stops
 constexpr double kDamping = 0.7;     // of the COM and the body
 constexpr double kPhase = 1.0 / 3;   // rad at k_d that the loop's delay may cost
-// A foot in the air holds nothing up, so it may be stiffer and lag more. It has a third of a
-// second: as soft as the rest it comes down beside its foothold (docs/lab/steps).
+// A foot in the air holds nothing up, so it may be stiffer and lag more. With the gains of the
+// others it comes down beside its foothold (docs/lab/steps).
 constexpr double kFootStiffness = 4, kFootPhase = 0.7;
 constexpr double kHorizon = 3;          // of the loop's delay: with a third it would ring
 constexpr double kVelocityCutoff = 20;  // Hz

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <span>
 
 #include "components/balance/contact_conditions.h"
@@ -40,9 +39,7 @@ Vector6d EdgeRow(std::span<const Eigen::Vector2d> corners, size_t i) {
 
 }  // namespace
 
-StepBalance::StepBalance(int num_joints, int most_held)
-    : num_joints_(num_joints), all_joints_(static_cast<size_t>(num_joints)), lcp_(kMostMet) {
-  std::iota(all_joints_.begin(), all_joints_.end(), 0);
+StepBalance::StepBalance(int num_joints, int most_held) : num_joints_(num_joints), lcp_(kMostMet) {
   const Index k = num_joints;
   const Index most = 2 * kMostSole + ConvexPolygon::kMaxCorners + 2 * k;
   torque_of_ = Eigen::MatrixXd::Zero(k, k);
@@ -174,14 +171,11 @@ void StepBalance::AddRegion(const StepBounds& bounds) {
   }
 }
 
-void StepBalance::AddTorques(std::span<const int> joints, const VectorRef& effort,
-                             const VectorRef& torque) {
-  for (const int j : joints) {
-    for (const double side : {1.0, -1.0}) {
-      bound_.col(bounds_).head(coordinates_) =
-          side * torque_of_.row(j).head(coordinates_).transpose();
-      room_[bounds_++] = (1 - kTorqueRounding) * effort[j] - side * torque[j];
-    }
+void StepBalance::AddTorque(Index joint, const VectorRef& effort, const VectorRef& torque) {
+  for (const double side : {1.0, -1.0}) {
+    bound_.col(bounds_).head(coordinates_) =
+        side * torque_of_.row(joint).head(coordinates_).transpose();
+    room_[bounds_++] = (1 - kTorqueRounding) * effort[joint] - side * torque[joint];
   }
 }
 
@@ -255,9 +249,12 @@ bool StepBalance::Compute(const ContactDynamics& contact, const StepBounds& boun
     row += 6;
   }
   AddRegion(bounds);
-  // What legs cannot give is none of their bounds: they would throw the robot to spare an arm that
-  // was struck.
-  AddTorques(movers == Movers::kLegs ? contact.legs() : all_joints_, effort, torque);
+  if (movers == Movers::kLegs) {
+    // The legs keep no limits but their own: they would throw the robot to spare a struck arm.
+    for (const int j : contact.legs()) AddTorque(j, effort, torque);
+  } else {
+    for (Index j = 0; j < num_joints_; ++j) AddTorque(j, effort, torque);
+  }
   result->wrench = result->task;
   result->changed = false;
   if (!Solve()) return false;

@@ -5,7 +5,6 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <array>
-#include <span>
 #include <vector>
 
 #include "components/balance/balance_control.h"
@@ -76,14 +75,13 @@ class StepBalance {
   void Hold(const ContactDynamics& contact, const HeldMotion& held, Eigen::Index coordinates);
   void AddSole(const SoleBounds& bounds, Eigen::Index row);
   void AddRegion(const StepBounds& bounds);
-  void AddTorques(std::span<const int> joints, const VectorRef& effort, const VectorRef& torque);
+  void AddTorque(Eigen::Index joint, const VectorRef& effort, const VectorRef& torque);
   /// a · F ≤ room for the contact wrenches F (12×1, or 6×1).
   void AddWrench(const Eigen::Matrix<double, 12, 1>& a, double room);
   /// The change within the bounds, into `step_`. False: not found.
   bool Solve();
 
   int num_joints_;
-  std::vector<int> all_joints_;
   Eigen::Index coordinates_ = 0, wrench_rows_ = 0, bounds_ = 0;
   Eigen::MatrixXd torque_of_, wrench_of_;  // by coordinate, k×n, m×n
   Eigen::MatrixXd metric_;                 // n×n; its Cholesky factor once it is solved with
