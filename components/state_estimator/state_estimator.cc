@@ -18,8 +18,6 @@ using Eigen::Vector3d;
 using robot::Foot;
 using robot::kFeet;
 
-constexpr double kStepCutoff = 60;  // Hz: G1 stands fewer pushes with 80 (docs/lab/steps)
-
 void CheckConfig(StateEstimatorConfig config, const robot::RobotModel& model) {
   if (config.invariant_ekf().has_sensor_delay()) return;
   config.mutable_invariant_ekf()->set_sensor_delay(model.drive_train().sensor_delay);
@@ -55,9 +53,8 @@ void StateEstimator::Configure(const ComponentContext& context, Wiring* wiring) 
   auto config = context.config<StateEstimatorConfig>();
   const std::shared_ptr<const robot::RobotModel> model = LoadRobot(context);
   if (!config.has_joint_velocity_cutoff()) {
-    config.set_joint_velocity_cutoff(config.steps()
-                                         ? std::min(kStepCutoff, balance::StepCutoff(*model))
-                                         : balance::VelocityCutoff(*model));
+    config.set_joint_velocity_cutoff(config.steps() ? balance::StepCutoff(*model)
+                                                    : balance::VelocityCutoff(*model));
   }
   CheckConfig(config, *model);
   wrenches_ = std::make_unique<FootWrenches>(model);

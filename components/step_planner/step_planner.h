@@ -56,7 +56,7 @@ class StepPlanner : public Component {
   struct Capture {
     bool known = false;  ///< else the COM is below the soles, or a number is not finite
     Eigen::Isometry3d frame_o = Eigen::Isometry3d::Identity();
-    /// It counts the COM's own momentum alone; Recovery's counts half of the angular momentum, too.
+    /// It counts the COM's own momentum alone; Recovery's counts angular momentum, too.
     balance::CapturePoint pendulum;
   };
 

@@ -63,6 +63,7 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
   const int num_joints = model_->num_joints();
   gains_ = ReadStandingGains(config, balance::GainsByRule(*model_, context.tick_period));
   tasks_.emplace(config, model_, gains_);
+  step_delay_ = balance::VelocityDelay(*model_, balance::StepCutoff(*model_));
   com_gains_ = gains_.com;
   if (!config.has_com()) soft_ground_.emplace(*model_, context.tick_period);
   base_share_ = balance::BaseVelocityShare(gains_.base_velocity_cutoff, context.tick_period);
@@ -171,7 +172,8 @@ int8_t TaskController::Control() {
   }
   in_contact_ = in_contact;
   if (!whole_body_->Update(state_, in_contact)) return task_torque_t::STATUS_SINGULAR;
-  const balance::TaskState state{*model_, state_, whole_body_->data()};
+  const bool steps = plan.com_follows == support_plan_t::FOLLOWS_COP;
+  const balance::TaskState state{*model_, state_, whole_body_->data(), steps ? step_delay_ : 0};
   if (!started_ || plan.gravity_compensation != 0) {
     started_ = true;
     base_velocity_ << state_.base_linear_velocity, state_.base_angular_velocity;

@@ -62,6 +62,7 @@ class TaskController : public Component {
   std::optional<TaskList> tasks_;
   robot::RobotState state_;
   balance::Vector6d base_velocity_ = balance::Vector6d::Zero();  // filtered
+  double step_delay_ = 0;  // s by which joint velocities are late in a step
   double base_share_ = 1;  // what of a new velocity it takes over in a tick
   bool state_valid_ = false;
   FeetInContact in_contact_{true, true};  // of the last tick

@@ -8,6 +8,7 @@
 #include <Eigen/QR>
 #include <Eigen/SVD>
 
+#include "components/balance/gains/gain_rule.h"
 #include "components/messages/motion.h"
 #include "components/task_controller/task_controller.h"
 #include "tests/components/control_fixture.h"
@@ -291,6 +292,57 @@ std::vector<std::vector<double>> Torques(TestRobot robot, const std::string& con
     torques.push_back(harness.output<task_torque_t>().torque);
   }
   return torques;
+}
+
+// Joint velocities come late. In a step the foot in the air is damped by what it moves at now, were
+// it accelerated as its reference.
+TEST(TaskList, AThrownFootIsDampedByNoLateVelocity) {
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  const double kd = 15, delay = balance::VelocityDelay(model, balance::StepCutoff(model));
+  ASSERT_GT(delay, 0.003);
+  ControlContext context(TestRobot::kDyros);
+  Harness<TaskController> harness(&context, "foot { kp: 100 kd: 15 }");
+  const Contacts contacts{true, false};
+  std::mt19937 random{TestSeed(41)};
+  std::bernoulli_distribution forwards;
+  for (int trial = 0; trial < 30; ++trial) {
+    robot::RobotState now = Disturbed(StandingState(model), 0.05, 0, &random);
+    robot::RobotState late = now;
+    VectorXd acceleration = VectorXd::Zero(model.num_velocities());
+    for (const int j : model.supporting_joints(model.feet()[1].body)) {
+      const double side = forwards(random) ? 1 : -1;
+      acceleration[6 + j] = side * 60;
+      now.joint_velocity[j] = side * 3;
+      late.joint_velocity[j] = now.joint_velocity[j] - delay * acceleration[6 + j];
+    }
+    const robot::RobotData is = robot::Evaluate(model, now);
+    const PointMotion reference{
+        is.foot_pose[1].translation(), is.foot_velocity[1].head<3>(),
+        is.foot_jacobian[1].topRows<3>() * acceleration + is.foot_bias_acceleration[1].head<3>()};
+    const Dynamics dynamics(model, late, contacts);
+    const robot_state_t message = StateMessage(model, late);
+    harness.Bind("robot_state", &message);
+    const Vector3d unforeseen =
+        kd * (reference.velocity - dynamics.data.foot_velocity[1].head<3>());
+    ASSERT_GT(unforeseen.norm(), 1);  // m/s²
+    for (const bool steps : {false, true}) {
+      support_plan_t plan = HoldAt(model, is, contacts);
+      plan.com_follows = steps ? support_plan_t::FOLLOWS_COP : support_plan_t::FOLLOWS_REFERENCE;
+      SetMotion(reference, &plan.foot_reference[1]);
+      harness.Bind("support_plan", &plan);
+      harness.Run(TickAt(2 * trial + (steps ? 1 : 0)));
+      const auto& out = harness.output<task_torque_t>();
+      ASSERT_EQ(out.status, task_torque_t::STATUS_OK);
+      VectorXd given, wrench;
+      dynamics.Forward(ToEigen(out.torque), &given, &wrench);
+      const Vector3d got = (dynamics.data.foot_jacobian[1] * given).head<3>() +
+                           dynamics.data.foot_bias_acceleration[1].head<3>() -
+                           reference.acceleration;
+      // In a step what J̇ changes by in the delay is left, of second order.
+      EXPECT_LT((got - (steps ? Vector3d(Vector3d::Zero()) : unforeseen)).norm(),
+                steps ? 0.3 * unforeseen.norm() : 1e-6);
+    }
+  }
 }
 
 TEST(TaskList, WithoutAListThereAreThePapersTasks) {

@@ -25,6 +25,7 @@ constexpr double kGearShare = 0.25;
 // heron, whose gears ring at 52 Hz, stands 33 of 96 pushes with 20 Hz and 5 with 60
 // (docs/lab/steps).
 constexpr double kStepGearShare = 0.3;
+constexpr double kMostStepCutoff = 60;  // Hz: G1 stands fewer pushes with 80 (docs/lab/steps)
 
 /// Hz, of the lowest at which a rotor rings on its gear; infinite where gears are rigid.
 double GearFrequency(const robot::RobotModel& model) {
@@ -44,11 +45,14 @@ double PendulumFrequency(const robot::RobotModel& model) {
   return std::sqrt(robot::kGravity / robot::StandingHeight(model));
 }
 
-double LoopDelay(const robot::RobotModel& model, double velocity_cutoff, double period) {
-  const robot::DriveTrainModel& drive = model.drive_train();
+double VelocityDelay(const robot::RobotModel& model, double velocity_cutoff) {
   // A second-order Butterworth filter delays by √2/ω_c.
-  return std::numbers::sqrt2 / (2 * std::numbers::pi * velocity_cutoff) + drive.sensor_delay +
-         drive.torque_lag + 0.5 * period;
+  return std::numbers::sqrt2 / (2 * std::numbers::pi * velocity_cutoff) +
+         model.drive_train().sensor_delay;
+}
+
+double LoopDelay(const robot::RobotModel& model, double velocity_cutoff, double period) {
+  return VelocityDelay(model, velocity_cutoff) + model.drive_train().torque_lag + 0.5 * period;
 }
 
 double LimitHorizon(const robot::RobotModel& model, double period) {
@@ -60,7 +64,7 @@ double VelocityCutoff(const robot::RobotModel& model) {
 }
 
 double StepCutoff(const robot::RobotModel& model) {
-  return std::max(kVelocityCutoff, kStepGearShare * GearFrequency(model));
+  return std::clamp(kStepGearShare * GearFrequency(model), kVelocityCutoff, kMostStepCutoff);
 }
 
 StandingGains GainsByRule(const robot::RobotModel& model, double period) {

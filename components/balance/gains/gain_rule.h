@@ -12,11 +12,15 @@ double PendulumFrequency(const robot::RobotModel& model);
 
 /// Hz, of the low-pass on joint velocities: well below every rotor on its gear, √(k/J).
 double VelocityCutoff(const robot::RobotModel& model);
-/// Hz, the highest of that low-pass with which the robot steps; infinite where gears are rigid.
+/// Hz, of that low-pass on the joints of a robot that steps.
 double StepCutoff(const robot::RobotModel& model);
 
-/// s, from a joint's motion to the torque that answers it: velocity filter, delay, current loop,
-/// half a tick.
+/// s by which the joints' velocities in a state are late: low-pass of `velocity_cutoff`, Hz, and
+/// sensors.
+double VelocityDelay(const robot::RobotModel& model, double velocity_cutoff);
+
+/// s, from a joint's motion to the torque that answers it: VelocityDelay, current loop, half a
+/// tick.
 double LoopDelay(const robot::RobotModel& model, double velocity_cutoff, double period);
 
 /// s, of the joints' limits (JointLimits): an approach to a limit is a loop of first order.

@@ -22,8 +22,11 @@ class FrameTask : public Task {
   }
 
   void Write(const TaskState& state, const TaskTarget& target, TaskRows* rows) const override {
-    const FrameMotion motion = Motion(state);
+    FrameMotion motion = Motion(state);
     if (sole_) {
+      // Late, a thrown leg's velocities say that its foot rises: damping would push it down.
+      motion.velocity.head<3>() +=
+          state.sole_delay * (target.acceleration - motion.bias_acceleration.head<3>());
       CopySelected(rows_, state.data.foot_jacobian[*sole_], rows->jacobian);
     } else {
       FillFrameJacobian(state.model, state.data, frame_, jacobian_);

@@ -43,6 +43,9 @@ struct TaskState {
   const robot::RobotModel& model;
   const robot::RobotState& state;
   const robot::RobotData& data;
+  /// s by which the velocities of a leg's joints are late for the task of its sole, which then
+  /// takes it for as fast as it is now, were it accelerated as its reference.
+  double sole_delay = 0;
 };
 
 /// Rows of ẍ = J q̈ + J̇ q̇ and the f* that ẍ shall be; a task fills its own.

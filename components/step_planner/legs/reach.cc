@@ -17,10 +17,10 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr int kDirections = 12;          // corners of a leg's polygon
-constexpr double kOmegaStepTime = 0.05;  // m, of the search along a direction
-constexpr double kFinest = 0.004;        // m, to which the edge is found
-constexpr double kFarthest = 2;          // m: no leg is longer
+constexpr int kDirections = 12;       // corners of a leg's polygon
+constexpr double kSearchStep = 0.05;  // m, of the search along a direction
+constexpr double kFinest = 0.004;     // m, to which the edge is found
+constexpr double kFarthest = 2;       // m: no leg is longer
 // Share of the way to the edge that counts as reached: a straight leg moves the sole no more.
 constexpr double kOfStraight = 0.97;
 constexpr int kMaxIterations = 15;
@@ -139,7 +139,7 @@ balance::ConvexPolygon LegPolygon(const robot::RobotModel& model, double height,
     const Vector3d direction(std::cos(angle), std::sin(angle), 0);
     Leg leg(model, *standing, foot);
     const Vector3d start = leg.sole();
-    double reached = 0, stride = kOmegaStepTime;
+    double reached = 0, stride = kSearchStep;
     while (stride > kFinest && reached < kFarthest) {
       if (leg.Reach(start + (reached + stride) * direction)) {
         reached += stride;

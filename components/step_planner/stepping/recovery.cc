@@ -20,9 +20,11 @@ constexpr int kMostSteps = 12;         // in a row: an end to steps that catch n
 // Share of the ample margin, below which the other foot goes on as one lands: both feet on the
 // ground cost the time in which the capture point leaves them.
 constexpr double kStepOnShare = 0.5;
-// Share of the angular momentum about the COM that counts in the capture point: what the swinging
-// leg and the turning body give to the COM and take from it then moves no foothold.
-constexpr double kMomentumShare = 0.5;
+// Share of the angular momentum about the COM that counts in the capture point, of a walk and else:
+// what the swinging leg and the turning body give to the COM and take from it then moves no
+// foothold.
+constexpr double kWalkMomentumShare = 1, kMomentumShare = 0.5;
+constexpr double kTransferGain = 0.3;  // of a landing, in the time until a landed foot carries
 // 1/s, critically damped: a turned body returns to upright at this rate, and the COM's reference
 // leaves room within the soles for what that takes.
 constexpr double kLeanRate = 6;
@@ -57,7 +59,9 @@ void Recovery::Watch(double time, double excess) {
 
 bool Recovery::Update(const StepInput& input) {
   const double time = input.time;
-  StepState state = Observe(input, active() ? in_contact_ : input.in_contact, kMomentumShare);
+  const bool walks = active() && reason_ == StepReason::kWalk;
+  StepState state = Observe(input, active() ? in_contact_ : input.in_contact,
+                            walks ? kWalkMomentumShare : kMomentumShare);
   const double excess = Excess(state);
   Watch(time, excess);
   const double period = TickPeriod(time - time_);
@@ -314,6 +318,9 @@ bool Recovery::StepAtLanding(const StepInput& input, const StepState& state) {
     if (margin > kStepOnShare * choice_.limits().ample_margin) return false;
     next = choice_.Next(state, other, 0);
   }
+  if (reason_ == StepReason::kWalk) {
+    transfer_ += kTransferGain * (input.time - since_ - transfer_);
+  }
   if (!BeginStep(input, next, reason)) return false;
   LiftOff(input);
   return true;
@@ -499,7 +506,7 @@ void Recovery::Archive(StateArchive* archive) {
   archive->Show(stage_, reason_, num_begun_, steps_now_, in_contact_, plan_, steps_, foot_, height_,
                 outside_, near_edge_, time_, since_, ramp_from_, stays_outside_, stays_near_edge_,
                 excess_at_edge_, moving_since_, cop_from_, standing_height_, together_asked_,
-                shift_, step_helps_, command_, turns_, heading_, stride_, output_);
+                shift_, step_helps_, command_, turns_, heading_, stride_, transfer_, output_);
 }
 
 }  // namespace poise::stepping

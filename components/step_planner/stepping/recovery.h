@@ -179,6 +179,7 @@ class Recovery {
   DampedLead height_{kHeightRate};  // m, world, of the COM's reference
   WalkCommand command_;
   StrideCorrection stride_;
+  double transfer_ = 0.5 * kWalkLoadTime;  // s from a walk's touch-down until the foot carries
   BodyHeading heading_{kYawRate};
   bool turns_ = false;
   StepOutput output_;

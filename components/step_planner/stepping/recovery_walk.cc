@@ -20,7 +20,7 @@ constexpr double kMoved = 0.08;
 }  // namespace
 
 Gait Recovery::gait(const StepState& state) const {
-  const double transfer = 0.5 * kWalkLoadTime;
+  const double transfer = std::min(transfer_, kWalkLoadTime);
   if (command_.has_footholds()) {
     const StepLimits& limits = choice_.limits();
     const double least = limits.unload + limits.least_swing + transfer;

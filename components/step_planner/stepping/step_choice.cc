@@ -244,7 +244,7 @@ StepPlan StepChoice::Stride(const StepState& state, Foot foot, const Gait& gait,
   const auto least = [&](const StepPlan& plan) {
     return unload +
            std::max(limits_.least_swing, LeastSwingTime((plan.foothold - state.sole[foot]).norm(),
-                                                        limits_.stride_acceleration));
+                                                        limits_.acceleration));
   };
   double time = unload + gait.period - gait.transfer;
   StepPlan plan = StrideAt(state, foot, gait, time);
