@@ -301,7 +301,7 @@ TEST(TaskList, AThrownFootIsDampedByNoLateVelocity) {
   const double kd = 15, delay = balance::VelocityDelay(model, balance::StepCutoff(model));
   ASSERT_GT(delay, 0.003);
   ControlContext context(TestRobot::kDyros);
-  Harness<TaskController> harness(&context, "foot { kp: 100 kd: 15 }");
+  Harness<TaskController> harness(&context, "foot { kp: 100 kd: 15 } joint_limits: false");
   const Contacts contacts{true, false};
   std::mt19937 random{TestSeed(41)};
   std::bernoulli_distribution forwards;
