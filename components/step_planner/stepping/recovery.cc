@@ -24,7 +24,7 @@ constexpr double kStepOnShare = 0.5;
 // what the swinging leg and the turning body give to the COM and take from it then moves no
 // foothold.
 constexpr double kWalkMomentumShare = 1, kMomentumShare = 0.5;
-constexpr double kTransferGain = 0.3;  // of a landing, in the time until a landed foot carries
+constexpr double kTransferGain = 0.2;  // of a landing, in the time until a landed foot carries
 // 1/s, critically damped: a turned body returns to upright at this rate, and the COM's reference
 // leaves room within the soles for what that takes.
 constexpr double kLeanRate = 6;
