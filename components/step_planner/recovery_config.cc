@@ -29,8 +29,8 @@ constexpr double kSoleMargin = 0.02;
 constexpr double kOvershoot = 0.04;
 // m of the capture point inside the new support, beyond which a foothold is no better.
 constexpr double kAmpleMargin = 0.04;
-// Share of the hip joints' effort that swings the leg: more than all of it, as the trunk gives way.
-// Fitted: G1 with 12 joints stands 37 of 60 pushes with 0.9 and 42 with 1.2 (docs/lab/steps).
+// Share of the hip joints' effort that a planned swing may ask for. Fitted: G1 with 12 joints
+// stands 37 of 60 pushes with 0.9 and 42 with 1.2 (docs/lab/walking).
 constexpr double kSwingEffort = 1.2;
 // s of the ramp (61) before a foot leaves the ground, and s in the air at least. On a point mass
 // shorter ones catch no more (docs/lab/steps/2026-11-28-level-feet.md).

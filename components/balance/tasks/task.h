@@ -43,8 +43,8 @@ struct TaskState {
   const robot::RobotModel& model;
   const robot::RobotState& state;
   const robot::RobotData& data;
-  /// s by which the velocities of a leg's joints are late for the task of its sole, which then
-  /// takes it for as fast as it is now, were it accelerated as its reference.
+  /// s by which the joints' velocities are late. The task of a sole adds what its reference's
+  /// acceleration changes the sole's velocity by in that time.
   double sole_delay = 0;
 };
 

@@ -20,9 +20,8 @@ constexpr int kMostSteps = 12;         // in a row: an end to steps that catch n
 // Share of the ample margin, below which the other foot goes on as one lands: both feet on the
 // ground cost the time in which the capture point leaves them.
 constexpr double kStepOnShare = 0.5;
-// Share of the angular momentum about the COM that counts in the capture point, of a walk and else:
-// what the swinging leg and the turning body give to the COM and take from it then moves no
-// foothold.
+// Shares of the angular momentum about the COM that count in the capture point, in a walk and in
+// other steps. What the swinging leg and the turning body lend to the COM then moves no foothold.
 constexpr double kWalkMomentumShare = 1, kMomentumShare = 0.5;
 constexpr double kTransferGain = 0.2;  // of a landing, in the time until a landed foot carries
 // 1/s, critically damped: a turned body returns to upright at this rate, and the COM's reference
