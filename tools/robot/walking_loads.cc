@@ -49,7 +49,7 @@ class Step {
   double both() const { return 0.5 * stepping::Recovery::kWalkLoadTime; }
   double single() const {
     return stepping::Recovery::kOmegaStepTime *
-               std::sqrt((height_ - spec_.walk_lowering) / robot::kGravity) -
+               std::sqrt((height_ - spec_.holding_lowering) / robot::kGravity) -
            both();
   }
 
@@ -66,7 +66,7 @@ class Step {
     swing.Begin(from, Eigen::Matrix3d::Identity(), across + ahead,
                 Eigen::AngleAxisd(turn, Vector3d::UnitZ()).toRotationMatrix(), 0, single(),
                 stepping::Recovery::kSwing);
-    const double com_height = height_ - spec_.walk_lowering;
+    const double com_height = height_ - spec_.holding_lowering;
     const double omega = std::sqrt(robot::kGravity / com_height);
     const Orbit sagittal(omega, single(), both(), 0.5 * length, false);
     const Orbit lateral(omega, single(), both(), 0.5 * limits_.spacing, true);

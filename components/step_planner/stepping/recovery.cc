@@ -437,10 +437,9 @@ bool Recovery::AtRest(const StepInput& input, const StepState& state) {
 }
 
 double Recovery::LoweringShare(const StepState& state) const {
-  const double lowering = choice_.reach().lowering();
-  const double walking = command_.stepping ? spec_.walk_lowering / lowering : 0;
+  const double held = std::min(spec_.holding_lowering / choice_.reach().lowering(), 1.0);
   // A walk keeps its height: a COM that comes down with each step brings its foot down too soon.
-  if (command_.stepping && reason_ == StepReason::kWalk) return std::min(walking, 1.0);
+  if (command_.stepping && reason_ == StepReason::kWalk) return held;
   const bool together = reason_ == StepReason::kTogether;
   const bool steps = stage_ == Stage::kUnloading || stage_ == Stage::kSwinging;
   // A knee that gets straight is stopped, and its foot hangs short of the foothold.
@@ -453,10 +452,11 @@ double Recovery::LoweringShare(const StepState& state) const {
     const bool swings = steps && foot == plan_.foot;
     offset[foot] = turn * ((swings ? plan_.foothold : state.sole[foot]) - com);
   }
-  const double needed = std::max(walking, choice_.reach().LoweringShare(offset));
+  const double needed =
+      std::max(command_.stepping ? held : 0, choice_.reach().LoweringShare(offset));
   // With the feet put together nothing is to be caught, and knees that are bent for seconds get
   // hot.
-  return std::min(needed, together ? std::min(spec_.holding_lowering / lowering, 1.0) : 1.0);
+  return std::min(needed, together ? held : 1.0);
 }
 
 void Recovery::LeadCom(const StepInput& input, const StepState& state) {

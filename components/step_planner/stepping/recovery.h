@@ -21,8 +21,7 @@ struct RecoverySpec {
   double margin_to_sole_edge = 0;
   /// m inside the soles, within which is known whether a step helps; < 0: nowhere.
   double watched_margin = -1;
-  double walk_lowering = 0;  ///< m by which the COM walks lower than it stands
-  /// m by which it can be lower than it stands on one leg for as long as one likes.
+  /// m by which the COM can be lower than it stands on one leg for as long as one likes: so it walks.
   double holding_lowering = 0;
 };
 

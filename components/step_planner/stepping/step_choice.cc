@@ -234,7 +234,7 @@ StepPlan StepChoice::StrideAt(const StepState& state, Foot foot, const Gait& gai
   plan.time = time;
   plan.yaw = stride.next.yaw;
   const Vector2d wanted = plan.capture_point - stride.end - state.sole[s];
-  PutDown(state, Eigen::Rotation2Dd(-state.yaw) * wanted, limits_.stride_lowering, &plan);
+  PutDown(state, Eigen::Rotation2Dd(-state.yaw) * wanted, 1, &plan);
   plan.moved = (plan.foothold - stride.next.position).norm();
   return plan;
 }

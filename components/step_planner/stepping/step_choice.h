@@ -23,7 +23,6 @@ struct StepLimits {
   double ample_margin = 0;  ///< m of the capture point inside the new support; more is no better
   double longest = 0, widest = 0;  ///< m of a walk's step ahead, and aside beyond `spacing`
   double most_turn = 0;            ///< rad of a walk's step
-  double stride_lowering = 1;      ///< share of `Reach::lowering` that a walk's footholds count on
   double spacing = 0;  ///< m, sideways between the soles' centres, when nothing asks for more
   /// m between the legs' lines at a foothold ahead of the stance sole or behind it; 0: there is
   /// none
