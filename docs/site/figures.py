@@ -543,7 +543,7 @@ def _(task, i, first, _):
              "joint_torque_share", "violated_ticks")
 
 
-@reads_row("walking", "Three of them walk at")
+@reads_row("walking", "G1 and the paper's robot walk")
 def _(task, i, first, cells):
     figures = [task.command(task.told(), NAME=robot(first), W=world, V=cells[1]).summary()[0] for world in WORLDS]
     put_each(task, i, 2, figures, "walk_speed_max", "walk_course_share", "walk_cost_of_transport", "joint_torque_share",
