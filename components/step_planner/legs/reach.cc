@@ -219,6 +219,17 @@ double Reach::LoweringShare(const FootArray<Vector2d>& offset) const {
   return share;
 }
 
+double Reach::UsefulLowering(const FootArray<Vector2d>& offset) const {
+  double share = 0;
+  for (const Foot i : kFeet) {
+    const double high = balance::SignedDistance(leg_[i][0], offset[i]);
+    const double low = balance::SignedDistance(leg_[i][1], offset[i]);
+    if (high >= 0 || low <= high) continue;
+    share = std::max(share, low > 0 ? -high / (low - high) : 1);
+  }
+  return share;
+}
+
 double Reach::BesideCom(Foot stance) const {
   double inside = -kFarthest;
   for (const balance::ConvexPolygon& leg : leg_[stance]) {

@@ -452,11 +452,11 @@ double Recovery::LoweringShare(const StepState& state) const {
     const bool swings = steps && foot == plan_.foot;
     offset[foot] = turn * ((swings ? plan_.foothold : state.sole[foot]) - com);
   }
-  const double needed =
-      std::max(command_.stepping ? held : 0, choice_.reach().LoweringShare(offset));
+  const double walking = command_.stepping ? held : 0;
   // With the feet put together nothing is to be caught, and knees that are bent for seconds get
   // hot.
-  return std::min(needed, together ? held : 1.0);
+  if (together) return std::min(std::max(walking, choice_.reach().UsefulLowering(offset)), held);
+  return std::min(std::max(walking, choice_.reach().LoweringShare(offset)), 1.0);
 }
 
 void Recovery::LeadCom(const StepInput& input, const StepState& state) {

@@ -191,6 +191,29 @@ class ReachCase : public testing::TestWithParam<TestRobot> {
   double lower_ = 0.08 * height_;
 };
 
+TEST_P(ReachCase, OnlyALegThatComesNearerByItLowersTheCom) {
+  const Reach reach(model_, height_, lower_, 0.02);
+  std::mt19937 random{TestSeed(164)};
+  std::uniform_real_distribution<double> any(-0.4, 0.4);
+  int lowered = 0, useless = 0;
+  for (int trial = 0; trial < 1000; ++trial) {
+    const robot::FootArray<Vector2d> offset{Vector2d(any(random), any(random)),
+                                            Vector2d(any(random), any(random))};
+    const auto outside = [&](Foot foot, double share) {
+      return std::max(0.0, -balance::SignedDistance(reach.Leg(foot, share), offset[foot]));
+    };
+    const bool nearer = std::ranges::any_of(
+        robot::kFeet, [&](Foot foot) { return outside(foot, 1) < outside(foot, 0) - 1e-12; });
+    const double share = reach.UsefulLowering(offset);
+    EXPECT_TRUE(share >= 0 && share <= 1) << share;
+    EXPECT_EQ(share > 0, nearer) << share;
+    lowered += share > 0;
+    useless += share == 0 && reach.LoweringShare(offset) > 1;
+  }
+  EXPECT_GT(lowered, 20);
+  EXPECT_GT(useless, 20);
+}
+
 // The posture solver, which knows nothing of the polygons, stands where they say.
 TEST_P(ReachCase, APostureExistsWhereverTheyReach) {
   const Reach reach(model_, height_, lower_, 0.02);
