@@ -36,9 +36,9 @@ constexpr double kSwingEffort = 1.2;
 // shorter ones catch no more (docs/lab/steps/2026-11-28-level-feet.md).
 constexpr double kPushUnload = 0.02, kLeastSwing = 0.12;
 constexpr double kGap = 0.02;  // m between the soles, sideways
-// Share of the standing height by which steps lower the COM, and by which it walks lower, where the
-// legs hold it so: knees that are bent reach on. Fitted: the tour of G1 with 29 joints, 64 runs,
-// lasts 51 s with 0.08 and 0.06, and 59 s with 0.1 (docs/lab/walking).
+// Share of the standing height by which steps lower the COM. A walk's COM is as low, where one leg
+// can hold the robot so. Fitted: the tour of G1 with 29 joints, 64 runs, lasts 51 s with 0.08 and a
+// walk's 0.06, and 59 s with 0.1 (docs/lab/walking/2026-11-30-how-low-a-walk.md).
 constexpr double kStepLowering = 0.1;
 // Share of the weight that an observed load must be above to be a landing: a leg that brakes its
 // swing was seen to be misjudged by 0.05, by more than three standard deviations.

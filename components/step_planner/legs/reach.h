@@ -44,8 +44,9 @@ class Reach {
   /// Least share of `lowering` with which the soles stand at `offset` from the COM by foot; above
   /// 1, and by how many m, when even the lowest does not do.
   double LoweringShare(const FootArray<Eigen::Vector2d>& offset) const;
-  /// Share of `lowering`, 0 to 1, that brings the soles to `offset`, or as near as they come. A leg
-  /// that comes no nearer by it, as one whose ankle rolls no further, asks for none.
+  /// Least share of `lowering`, 0 to 1, with which the soles stand at `offset`, or all of it where
+  /// that brings them nearer. It leaves out legs that it brings no nearer, as one whose ankle is at
+  /// its limit.
   double UsefulLowering(const FootArray<Eigen::Vector2d>& offset) const;
   /// m by which the COM stays beside the middle of the sole of `stance`, at the least, at either
   /// height: 0 where the leg stands right below it.

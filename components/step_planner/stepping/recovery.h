@@ -21,7 +21,8 @@ struct RecoverySpec {
   double margin_to_sole_edge = 0;
   /// m inside the soles, within which is known whether a step helps; < 0: nowhere.
   double watched_margin = -1;
-  /// m by which the COM can be lower than it stands on one leg for as long as one likes: so it walks.
+  /// m by which the COM can be lower than it stands, on one leg for as long as one likes. A walk
+  /// keeps it that low.
   double holding_lowering = 0;
 };
 
