@@ -69,5 +69,26 @@ TEST(MachineVerdictTest, NamesWhoeverMayHaveMadeCommandsLate) {
   EXPECT_EQ(CauseOfLateness(outcome), "2 faults were injected, or the machine was late");
 }
 
+TEST(MachineVerdictTest, FramesOfEmulatedDrivesAreLostByTheMachine) {
+  CheckResult frames;
+  frames.name = "bus_frames_lost";
+  frames.passed = false;
+  EXPECT_TRUE(FailedByMachine({frames}, {.emulated = true}));
+  EXPECT_TRUE(FailedByMachine({frames}, {.ticks = 3, .late = 3, .emulated = true}));
+  EXPECT_FALSE(FailedByMachine({frames}, {.ticks = 3, .late = 2, .emulated = true}));
+  EXPECT_FALSE(FailedByMachine({frames}, {})) << "a real cable loses them, too";
+  CheckResult other = frames;
+  other.name = "fallen";
+  EXPECT_FALSE(FailedByMachine({frames, other}, {.emulated = true}));
+
+  logging::RunRecord run;
+  run.spec = Spec();
+  EXPECT_FALSE(CountLostTicks(run).emulated);
+  run.spec.mutable_graph()->add_component()->set_plant(true);
+  EXPECT_TRUE(CountLostTicks(run).emulated);
+  run.spec.set_realtime(false);
+  EXPECT_FALSE(CountLostTicks(run).emulated);
+}
+
 }  // namespace
 }  // namespace poise

@@ -10,6 +10,7 @@ namespace poise {
 namespace {
 
 constexpr char kFollowMetric[] = "bridge_not_running_ticks";
+constexpr char kFramesMetric[] = "bus_frames_lost";
 
 bool WantOfCommand(int8_t reason) {
   return reason == bridge_status_t::REASON_NO_COMMAND ||
@@ -63,6 +64,7 @@ MachineVerdict JudgeMachine(const RunSpec& spec, const RunOutcome& outcome) {
 LostTicks CountLostTicks(const logging::RunRecord& run) {
   LostTicks lost;
   if (!run.spec.realtime()) return lost;
+  lost.emulated = std::ranges::any_of(run.spec.graph().component(), &ComponentInstance::plant);
   bool wrong = false;
   for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
     const joint_command_t* command = run.command.at(tick);
@@ -80,10 +82,11 @@ LostTicks CountLostTicks(const logging::RunRecord& run) {
 bool FailedByMachine(const std::vector<CheckResult>& checks, const LostTicks& lost) {
   const auto failed = [](const CheckResult& check) { return !check.passed; };
   const auto by_machine = [&](const CheckResult& check) {
-    return check.passed || check.name == kFollowMetric;
+    return check.passed || (check.name == kFollowMetric && lost.ticks > 0) ||
+           (check.name == kFramesMetric && lost.emulated);
   };
   return std::ranges::any_of(checks, failed) && std::ranges::all_of(checks, by_machine) &&
-         lost.ticks > 0 && lost.late == lost.ticks;
+         lost.late == lost.ticks;
 }
 
 std::string CauseOfLateness(const RunOutcome& outcome) {

@@ -26,8 +26,8 @@ MachineVerdict JudgeMachine(const RunSpec& spec, const RunOutcome& outcome);
 
 LostTicks CountLostTicks(const logging::RunRecord& run);
 
-/// True when checks failed, and only those that a command that is late fails by itself: the bridge
-/// did not follow for want of one.
+/// True when checks failed, and only those that a late machine fails by itself: the bridge did not
+/// follow for want of a command, or emulated drives lost frames.
 bool FailedByMachine(const std::vector<CheckResult>& checks, const LostTicks& lost);
 
 /// What may have kept commands from coming in time: what was injected, processes that died or were

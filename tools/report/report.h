@@ -89,6 +89,8 @@ struct LostTicks {
   /// Ticks of these that had no command in time, while the controller gave none that was wrong: the
   /// machine was late, or a fault was injected.
   int64_t late = 0;
+  /// The drives are processes of this machine: only its lateness or an injected fault loses frames.
+  bool emulated = false;
 };
 
 /// What a run came to.

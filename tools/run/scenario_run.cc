@@ -171,7 +171,8 @@ void ScenarioRun::PrintEnd(const logging::RunRecord& record, const RunResult& re
   } else if (!summary.passed && summary.checks.empty()) {
     problem = "there is no log";
   }
-  const char* const by = summary.failed_by_machine ? ", for want of commands in time alone" : "";
+  const char* const by =
+      summary.failed_by_machine ? ", for want of commands or frames in time alone" : "";
   if (options_.quiet || summary.checks.empty()) {
     if (!options_.quiet) fmt::print("{}", realtime);
     fmt::print("{}{}\n", FormatVerdict(summary.checks, problem), by);
