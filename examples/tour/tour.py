@@ -28,6 +28,8 @@ RATE = 2 * math.pi * 10  # rad/s of what nobody owns
 def joints_of(robot_text):
     """Name -> (link, armature) of the maker's MJCF that a robot's text names."""
     text = pathlib.Path(robot_text)
+    if not text.is_file():
+        raise SystemExit(f"{text}: no file; give the text that poise robot import wrote, NAME/NAME.pbtxt")
     mjcf = re.search(r'mjcf: "([^"]+)"', text.read_text())
     if mjcf is None:
         raise SystemExit(f"{text}: names no MJCF file; import g1_29dof.xml of unitree_rl_gym")
@@ -164,6 +166,7 @@ def main():
     parser.add_argument("--no-punches", action="store_true")
     parser.add_argument("--arms-held", action="store_true", help="the arms are the controller's")
     options = parser.parse_args()
+    joints_of(options.robot)  # a worker that ended for want of a robot would be waited for without end
     lived, completed, errors = [], 0, []
     with multiprocessing.Pool(options.jobs) as pool:
         tasks = [(options.first + i, options) for i in range(options.runs)]

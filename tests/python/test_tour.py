@@ -5,6 +5,7 @@ import math
 import os
 import pathlib
 import subprocess
+import sys
 import tempfile
 import types
 import unittest
@@ -35,6 +36,14 @@ class TourTest(unittest.TestCase):
         np.testing.assert_allclose(way, [0.3, 0, 0], atol=1e-12)
         left = (np.array([1 - 0.2 * math.sin(yaw), 2 + 0.2 * math.cos(yaw)]), yaw + 0.4)
         np.testing.assert_allclose(tour.error(truth, left)[2], [0, 0.2, 0.4], atol=1e-12)
+
+    def test_what_is_no_robot_is_said_in_a_line(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for wrong in folder, folder + "/none.pbtxt":
+                told = subprocess.run([sys.executable, ROOT / "examples/tour/tour.py", wrong], capture_output=True,
+                                      text=True, timeout=60)
+                self.assertEqual(told.returncode, 1)
+                self.assertRegex(told.stderr, f"^{wrong}: no file.*\n$")
 
     @unittest.skipUnless(MAKER.exists(), f"the maker's file {MAKER.name} is not beside the repository")
     def test_it_comes_to_the_first_way_points_with_moving_arms(self):
