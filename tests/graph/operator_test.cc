@@ -109,7 +109,8 @@ TEST_F(OperatorTest, APushAndASettingAreRepeatedToTheBit) {
   for (const auto& [arguments, why] : std::vector<std::pair<std::vector<std::string>, std::string>>{
            {{"set", "task_controller.orientation.kp=1e9"}, "is outside"},
            {{"set", "task_controller.com.kq=1"}, "did you mean task_controller.com.k"},
-           {{"set", "task_controller.com.kp"}, "is no FIELD=VALUE"},
+           {{"set", "task_controller.com.kp"},
+            "is no FIELD=VALUE, as in task_controller.com.kp=200"},
            {{"push", "--force", "1,2"}, "--force: needs 3 numbers"},
            {{"push", "--force", "nan,0,0"}, "must be finite"},
            {{"push", "--force", "1,0,0", "--body", "tail"}, "no moving link 'tail'"},

@@ -151,7 +151,9 @@ int SetLiveFields(const LiveSetOptions& options) {
   if (options.list == !options.assignments.empty()) {
     throw ConfigError("set: needs FIELD=VALUE, or --list");
   }
-  std::vector<OperatorAct> acts = ActsOf(ActKind::kSet, options.assignments, "set", "FIELD=VALUE");
+  std::vector<OperatorAct> acts = ActsOf(
+      ActKind::kSet, options.assignments, "set",
+      "FIELD=VALUE, as in task_controller.com.kp=200; poise set --list shows fields and ranges");
   const ActedRun run = FindActedRun(options.run, "poise set");
   return options.list ? ListLiveFields(run) : DoAssignments(run, std::move(acts));
 }
@@ -163,8 +165,8 @@ struct MoveOptions {
 };
 
 int MoveJoints(const MoveOptions& options) {
-  std::vector<OperatorAct> acts =
-      ActsOf(ActKind::kMove, options.assignments, "move", "JOINT=ANGLE");
+  std::vector<OperatorAct> acts = ActsOf(ActKind::kMove, options.assignments, "move",
+                                         "JOINT=ANGLE, as in left_elbow_pitch=-0.8");
   for (OperatorAct& act : acts) act.duration = options.duration;
   return DoAssignments(FindActedRun(options.run, "poise move"), std::move(acts));
 }
