@@ -199,7 +199,9 @@ TEST(WalkRun, UpAndDownStairsToAStandOnThem) {
           folder / way, "--set",       "step_planner.walk.command[1].time=20",
           "--duration", "30"};
       if (way == "down") arguments.insert(arguments.end(), {"--variant", "down"});
-      RunPoise(arguments);  // its exit code: the scenario asks for 20 steps
+      // Its exit code: the scenario asks for 20 steps.
+      const std::string output = RunPoise(arguments).output;
+      EXPECT_EQ(output.find("is walked at"), std::string::npos) << output;
       const nlohmann::json summary = ReadSummary(folder / way);
       EXPECT_EQ(Measured(summary, "fallen"), 0) << engine << way;
       EXPECT_EQ(Measured(summary, "violated_ticks"), 0) << engine << way;
