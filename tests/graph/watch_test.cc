@@ -67,7 +67,9 @@ class WatchTest : public ::testing::Test {
 };
 
 TEST_F(WatchTest, TopShowsEveryProcessAndChannel) {
+  setenv("COLUMNS", "200", 1);  // a line each
   const ProgramResult top = RunPoise({"top", run, "--once", "--interval", "2"});
+  unsetenv("COLUMNS");
   ASSERT_EQ(top.exit_code, 0) << top.output;
   EXPECT_EQ(top.output.find('\x1b'), std::string::npos);
   const logging::RunRecord record = End();

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "fmt/format.h"
 #include "tests/logging/log_test_support.h"
 
@@ -47,7 +49,9 @@ class TopViewTest : public ::testing::Test {
     snapshot.tick = 1521;
     snapshot.tick_rate = 250;
   }
-  std::string Text() const { return PlainText(TopView(spec, names, "runs/a", snapshot, 3)); }
+  std::string Text(int width = 200) const {
+    return PlainText(TopView(spec, names, "runs/a", snapshot, 3), width);
+  }
   /// The words of the first line that begins with `name`.
   std::vector<std::string> Row(const std::string& name) const {
     std::istringstream lines(Text());
@@ -142,6 +146,24 @@ TEST_F(TopViewTest, ShowsAChannel) {
                                      "1521", "robot_state_t"));
 }
 
+TEST_F(TopViewTest, WhatATerminalIsTooNarrowForComesBelow) {
+  snapshot.processes[0].name = "contact_wrench_monitor";
+  snapshot.processes[0].health.ticks_skipped = 12;
+  snapshot.processes.emplace_back().name = "recorder";
+  const std::string text = Text(80);
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80u) << line;
+  EXPECT_THAT(text, HasSubstr("\nPROCESS                UNSENT AGE s   TICK MEDIAN us MAX us\n"
+                              "contact_wrench_monitor     55   0.1   1520       256   1278\n"));
+  std::vector<std::string> cells;
+  for (const std::string& all : {text, Text()}) {
+    std::istringstream in(all);
+    const std::set<std::string> words{std::istream_iterator<std::string>(in), {}};
+    cells.push_back(fmt::format("{}", fmt::join(words, " ")));
+  }
+  EXPECT_EQ(cells[0], cells[1]);
+}
+
 TEST_F(TopViewTest, MarksWhatIsWrong) {
   using Style = ViewLine::Style;
   const auto style = [&] {
@@ -195,7 +217,7 @@ std::string FrameAt(const std::vector<ViewLine>& lines, int columns, int rows, V
 TEST(FrameTest, KeepsHeaderAndKeysAndScrollsTheRest) {
   std::vector<ViewLine> lines = {{"head 1"}, {"head 2"}, {"head 3"}, {"head 4"}, {""}};
   for (const char c : std::string("abcdef")) {
-    lines.push_back({fmt::format("{}:   0123456789", c), ViewLine::Style::kPlain, 5});
+    lines.push_back({fmt::format("{}:   0123456789", c), ViewLine::Style::kPlain, {4}});
   }
   const std::string head = "head 1\r\nhead 2\r\nhead 3\r\nhead 4\r\n";
   EXPECT_THAT(FrameAt(lines, 80, 24, {}), ::testing::StartsWith(head + "\r\na:   0123456789\r\n"));

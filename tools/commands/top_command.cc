@@ -8,6 +8,7 @@
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "tools/cli/command_line.h"
+#include "tools/cli/output_style.h"
 #include "tools/cli/signals.h"
 #include "tools/cli/terminal.h"
 #include "tools/commands/commands.h"
@@ -88,7 +89,7 @@ int Once(const TopOptions& options) {
       NowNanoseconds() + static_cast<int64_t>(options.interval * 1e3) * kMillisecond;
   while (NowNanoseconds() < end && StopSignal() == 0) watch.Spin(end);
   if (StopSignal() != 0) return kExitFailed;
-  fmt::print("{}", PlainText(watch.View()));
+  fmt::print("{}", PlainText(watch.View(), ScreenStyle().columns));
   if (!watch.HeardNothing()) return kExitOk;
   fmt::print(stderr,
              "poise: run {}: no process was heard of in {} s; try a longer --interval, or look at "
@@ -132,8 +133,8 @@ int Top(const TopOptions& options) {
     }
   }
   if (!ended) return kExitOk;
-  fmt::print("{}\nThe run has ended; its table: poise report {}\n", PlainText(view),
-             watch.live().dir().string());
+  fmt::print("{}\nThe run has ended; its table: poise report {}\n",
+             PlainText(view, ScreenStyle().columns), watch.live().dir().string());
   return kExitOk;
 }
 

@@ -99,22 +99,33 @@ std::string ProcessLabel(const RunSpec& spec, const std::string& component) {
   return component;
 }
 
+/// Cells with a space between them, in columns of `widths`; below 0: to the left.
+ViewLine Row(const std::vector<int>& widths, const std::vector<std::string>& cells, Style style) {
+  ViewLine line{"", style};
+  for (size_t i = 0; i < cells.size(); ++i) {
+    if (i > 0) line.text += ' ';
+    line.text += widths[i] < 0 ? fmt::format("{:<{}}", cells[i], -widths[i])
+                               : fmt::format("{:>{}}", cells[i], widths[i]);
+    line.ends.push_back(line.text.size());
+  }
+  return line;
+}
+
 void AddProcesses(const RunSpec& spec, const LiveSnapshot& snapshot, std::vector<ViewLine>* lines) {
   size_t width = 7;
   for (const auto& process : snapshot.processes) {
     width = std::max(width, ProcessLabel(spec, process.name).size());
   }
-  const size_t label = width + 1;
-  static constexpr char kRow[] =
-      "{:<{}} {:<8} {:>7} {:>6} {:>4} {:>4} {:>7} {:>7} {:>6} {:>6} {:>5} {:>6} {:>9} {:>6}";
-  lines->push_back(
-      {fmt::format(kRow, "PROCESS", width, "STATE", "TICKS/S", "P99 us", "LATE", "GAPS", "REFUSED",
-                   "DROPPED", "RESENT", "UNSENT", "AGE s", "TICK", "MEDIAN us", "MAX us"),
-       Style::kTitle, label});
+  const std::vector<int> widths = {
+      -static_cast<int>(width), -8, 7, 6, 4, 4, 7, 7, 6, 6, 5, 6, 9, 6};
+  lines->push_back(Row(widths,
+                       {"PROCESS", "STATE", "TICKS/S", "P99 us", "LATE", "GAPS", "REFUSED",
+                        "DROPPED", "RESENT", "UNSENT", "AGE s", "TICK", "MEDIAN us", "MAX us"},
+                       Style::kTitle));
   for (const auto& process : snapshot.processes) {
     const std::string name = ProcessLabel(spec, process.name);
     if (!process.seen) {
-      lines->push_back({fmt::format("{:<{}} not heard of", name, width), Style::kWarning, label});
+      lines->push_back(Row(widths, {name, "not heard of"}, Style::kWarning));
       continue;
     }
     const health_t& h = process.health;
@@ -122,15 +133,15 @@ void AddProcesses(const RunSpec& spec, const LiveSnapshot& snapshot, std::vector
     const bool failed = h.state == health_t::STATE_FAILED;
     const bool stale = process.age > kStale && h.state <= health_t::STATE_RUNNING;
     lines->push_back(
-        {fmt::format(
-             kRow, name, width, StateName(h.state), Number(process.tick_rate, 1),
-             Number(timed ? h.latency_p99 : -1, 0), h.deadline_misses, h.gaps, h.messages_refused,
-             h.messages_dropped, h.resends, h.publish_errors, Number(process.age, 1), Count(h.tick),
-             Number(timed ? h.latency_median : -1, 0), Number(timed ? h.latency_max : -1, 0)),
-         failed                           ? Style::kFailure
-         : stale || h.deadline_misses > 0 ? Style::kWarning
-                                          : Style::kPlain,
-         label});
+        Row(widths,
+            {name, StateName(h.state), Number(process.tick_rate, 1),
+             Number(timed ? h.latency_p99 : -1, 0), Count(h.deadline_misses), Count(h.gaps),
+             Count(h.messages_refused), Count(h.messages_dropped), Count(h.resends),
+             Count(h.publish_errors), Number(process.age, 1), Count(h.tick),
+             Number(timed ? h.latency_median : -1, 0), Number(timed ? h.latency_max : -1, 0)},
+            failed                           ? Style::kFailure
+            : stale || h.deadline_misses > 0 ? Style::kWarning
+                                             : Style::kPlain));
     AddRealTime(h, lines);
     if (!h.detail.empty()) {
       lines->push_back({fmt::format("  {}", logging::Printable(h.detail)),
@@ -142,11 +153,11 @@ void AddProcesses(const RunSpec& spec, const LiveSnapshot& snapshot, std::vector
 /// A line for each slave of the drives' bus.
 void AddBus(const bus_status_t& bus, std::vector<ViewLine>* lines) {
   constexpr int kOperational = 8, kError = 16;
-  constexpr size_t kLabel = 6;
-  static constexpr char kRow[] = "{:<6}{:<22}{:>8}{:>10}{:>10}{:>11}{:>10}{:>11}{:>11}";
-  lines->push_back({fmt::format(kRow, "SLAVE", "STATE", "603F", "EMERGENCY", "COUNT", "CLOCK ns",
-                                "RX ERR", "LOST LINK", "RECOVERED"),
-                    Style::kTitle, kLabel});
+  const std::vector<int> widths = {-5, -22, 7, 9, 9, 10, 9, 10, 10};
+  lines->push_back(Row(widths,
+                       {"SLAVE", "STATE", "603F", "EMERGENCY", "COUNT", "CLOCK ns", "RX ERR",
+                        "LOST LINK", "RECOVERED"},
+                       Style::kTitle));
   for (size_t i = 0; i < bus.online.size(); ++i) {
     const int status = bus.al_status[i];
     const char* const name = (status & 15) == 1   ? "INIT"
@@ -160,40 +171,40 @@ void AddBus(const bus_status_t& bus, std::vector<ViewLine>* lines) {
     }
     const bool good = bus.online[i] != 0 && status == kOperational;
     const bool odd = bus.error_code[i] != 0 || bus.receive_errors[i] != 0;
-    lines->push_back({fmt::format(kRow, i, state, fmt::format("{:04X}", bus.error_code[i]),
-                                  fmt::format("{:04X}", bus.emergency[i]), bus.emergencies[i],
-                                  bus.clock_difference[i], bus.receive_errors[i], bus.lost_links[i],
-                                  bus.recoveries[i]),
-                      !good ? Style::kFailure
-                      : odd ? Style::kWarning
-                            : Style::kPlain,
-                      kLabel});
+    lines->push_back(
+        Row(widths,
+            {Count(static_cast<int64_t>(i)), state, fmt::format("{:04X}", bus.error_code[i]),
+             fmt::format("{:04X}", bus.emergency[i]), fmt::format("{}", bus.emergencies[i]),
+             fmt::format("{}", bus.clock_difference[i]), fmt::format("{}", bus.receive_errors[i]),
+             fmt::format("{}", bus.lost_links[i]), fmt::format("{}", bus.recoveries[i])},
+            !good ? Style::kFailure
+            : odd ? Style::kWarning
+                  : Style::kPlain));
   }
 }
 
 void AddChannels(const LiveSnapshot& snapshot, std::vector<ViewLine>* lines) {
   size_t name = 7;
   for (const auto& channel : snapshot.channels) name = std::max(name, channel.name.size());
-  static constexpr char kRow[] = "{:<{}} {:>9}{:>8}{:>8}{:>12}{:>8}{:>9}  {}";
-  const size_t label = name + 1;
-  lines->push_back({fmt::format(kRow, "CHANNEL", name, "MSG/S", "AGE s", "MISSED", "DATA", "B/MSG",
-                                "TICK", "TYPE"),
-                    Style::kTitle, label});
+  const std::vector<int> widths = {-static_cast<int>(name), 9, 7, 7, 11, 7, 8, 0};
+  lines->push_back(Row(widths,
+                       {"CHANNEL", "MSG/S", "AGE s", "MISSED", "DATA", "B/MSG", "TICK", "TYPE"},
+                       Style::kTitle));
   double bytes = 0;
   double rate = 0;
   for (const auto& channel : snapshot.channels) {
     bytes += channel.bytes_per_second;
     rate += channel.rate;
-    lines->push_back(
-        {fmt::format(kRow, channel.name, name, Number(channel.rate, 1), Number(channel.age, 2),
-                     channel.missed, Rate(channel.bytes_per_second),
-                     channel.bytes_per_message > 0 ? fmt::format("{}", channel.bytes_per_message)
-                                                   : kNothing,
-                     Count(channel.tick), channel.type),
-         Style::kPlain, label});
+    lines->push_back(Row(
+        widths,
+        {channel.name, Number(channel.rate, 1), Number(channel.age, 2),
+         fmt::format("{}", channel.missed), Rate(channel.bytes_per_second),
+         channel.bytes_per_message > 0 ? fmt::format("{}", channel.bytes_per_message) : kNothing,
+         Count(channel.tick), channel.type},
+        Style::kPlain));
   }
   lines->push_back(
-      {fmt::format("{:<{}} {:>9.1f}{:>28}", "all", name, rate, Rate(bytes)), Style::kPlain, label});
+      Row(widths, {"all", fmt::format("{:.1f}", rate), "", "", Rate(bytes)}, Style::kPlain));
 }
 
 // SGR sequences stand in the order of Style.
@@ -217,9 +228,40 @@ std::vector<ViewLine> TopView(const RunSpec& spec, const logging::ElementNames& 
   return lines;
 }
 
-std::string PlainText(const std::vector<ViewLine>& lines) {
+std::string PlainText(const std::vector<ViewLine>& lines, int width) {
   std::string text;
-  for (const ViewLine& line : lines) text += line.text + '\n';
+  for (auto begin = lines.begin(); begin != lines.end();) {
+    if (begin->text.empty()) {
+      text += '\n';
+      ++begin;
+      continue;
+    }
+    const auto end = std::find_if(  // of the table
+        begin, lines.end(), [](const ViewLine& line) { return line.text.empty(); });
+    const size_t columns = begin->ends.size();
+    const auto fits = [&](size_t first, size_t last) {
+      return std::all_of(begin, end, [&](const ViewLine& line) {
+        const auto& ends = line.ends;
+        return ends.size() <= last ||
+               ends[0] + ends[last] - ends[first - 1] <= static_cast<size_t>(width);
+      });
+    };
+    size_t first = 1;
+    do {
+      size_t last = first;
+      while (last + 1 < columns && fits(first, last + 1)) ++last;
+      if (first > 1) text += '\n';
+      for (auto line = begin; line != end; ++line) {
+        const auto& ends = line->ends;
+        if (ends.empty() && first == 1) text += Wrapped(line->text, width, 4) + '\n';
+        if (ends.size() <= first) continue;
+        const size_t from = ends[first - 1], to = ends[std::min(last, ends.size() - 1)];
+        text += line->text.substr(0, ends[0]) + line->text.substr(from, to - from) + '\n';
+      }
+      first = last + 1;
+    } while (first < columns);
+    begin = end;
+  }
   return text;
 }
 
@@ -246,7 +288,7 @@ std::string Frame(const std::vector<ViewLine>& lines, int columns, int rows, Vie
   const size_t room = std::min(rest.size(), height - 1 - header);
   size_t longest = 0;
   for (const ViewLine* line : rest) {
-    if (line->label > 0) longest = std::max(longest, line->text.size());
+    if (!line->ends.empty()) longest = std::max(longest, line->text.size());
   }
   scroll->line = std::clamp(scroll->line, 0, static_cast<int>(rest.size() - room));
   scroll->column =
@@ -263,8 +305,9 @@ std::string Frame(const std::vector<ViewLine>& lines, int columns, int rows, Vie
     frame += "\r\n";
   }
   for (size_t i = first; i < first + room; ++i) {
-    const auto& [text, style, label] = *rest[i];
-    const bool moves = label > 0 && aside > 0;
+    const auto& [text, style, ends] = *rest[i];
+    const bool moves = !ends.empty() && aside > 0;
+    const size_t label = moves ? std::min(ends[0] + 1, text.size()) : 0;
     show(moves ? text.substr(0, label) + text.substr(std::min(text.size(), label + aside)) : text,
          style);
     frame += "\r\n";

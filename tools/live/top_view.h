@@ -16,7 +16,8 @@ struct ViewLine {
   enum class Style { kPlain, kTitle, kWarning, kFailure };
   std::string text;
   Style style = Style::kPlain;
-  size_t label = 0;  ///< characters of a table's first column, which stays in sight; 0: no table
+  /// Where the columns of a table's row end; the first one stays in sight. Empty: no table.
+  std::vector<size_t> ends = {};
 };
 
 /// Lines that stay at the top of a frame: what the run as a whole does.
@@ -38,8 +39,9 @@ std::vector<ViewLine> TopView(const RunSpec& spec, const logging::ElementNames& 
                               const std::string& dir, const LiveSnapshot& snapshot,
                               int64_t refused);
 
-/// Plain text, a line feed after each line.
-std::string PlainText(const std::vector<ViewLine>& lines);
+/// Plain text, a line feed after each line. Columns that do not fit `width` come in further blocks
+/// below, the first one again in each.
+std::string PlainText(const std::vector<ViewLine>& lines, int width);
 
 /// One frame for a terminal of this size, over the frame before: the header, what `scroll` says of
 /// the rest, and a last line with the keys. `scroll` is kept within the view.
