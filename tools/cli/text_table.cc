@@ -42,7 +42,23 @@ int Total(const std::vector<int>& widths) {
                          kGap * (static_cast<int>(widths.size()) - 1));
 }
 
-/// Widths of `columns` that fit, the widest shrunk first; the least ones when nothing fits.
+/// `text` with words longer than `width` in pieces.
+std::string Broken(const std::string& text, int width) {
+  std::string broken;
+  int length = 0;  // of the word
+  for (const char c : text) {
+    const bool begins = (static_cast<unsigned char>(c) & 0xC0) != 0x80;  // a character of UTF-8
+    length = c == ' ' ? 0 : length + (begins ? 1 : 0);
+    if (length > width) {
+      broken += ' ';
+      length = 1;
+    }
+    broken += c;
+  }
+  return broken;
+}
+
+/// Widths of `columns` that fit, the widest shrunk first; below the least ones when these do not.
 std::vector<int> Fit(const std::vector<ColumnWidth>& all, const std::vector<size_t>& columns,
                      int width) {
   std::vector<int> widths;
@@ -53,7 +69,10 @@ std::vector<int> Fit(const std::vector<ColumnWidth>& all, const std::vector<size
       if (widths[k] <= all[columns[k]].least) continue;
       if (widest == columns.size() || widths[k] > widths[widest]) widest = k;
     }
-    if (widest == columns.size()) break;
+    if (widest == columns.size()) {
+      widest = static_cast<size_t>(std::ranges::max_element(widths) - widths.begin());
+    }
+    if (widths[widest] == 1) break;
     --widths[widest];
   }
   return widths;
@@ -66,7 +85,7 @@ std::string Block(const std::vector<TableRow>& rows, const std::vector<size_t>& 
     std::vector<std::vector<std::string>> cells;
     size_t height = 1;
     for (size_t k = 0; k < columns.size(); ++k) {
-      cells.push_back(Split(Wrapped(rows[r][columns[k]].text, widths[k]), '\n'));
+      cells.push_back(Split(Wrapped(Broken(rows[r][columns[k]].text, widths[k]), widths[k]), '\n'));
       height = std::max(height, cells.back().size());
     }
     for (size_t line = 0; line < height; ++line) {

@@ -27,8 +27,8 @@ using TableRow = std::vector<TableCell>;
 
 /// The rows in aligned columns, a line below the first one, the heading. All rows have as many
 /// cells as it; UTF-8. Where they do not fit `width`, long cells are wrapped between words, and
-/// what still does not fit comes in further blocks below, the first column again in each. What is
-/// no printable text is escaped.
+/// what still does not fit comes in further blocks below, the first column again in each. A word
+/// that is too long even there is broken. What is no printable text is escaped.
 std::string FormatColumns(std::vector<TableRow> rows, int width = ScreenStyle().columns);
 
 using logging::CsvCell;
