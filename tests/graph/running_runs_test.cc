@@ -161,6 +161,9 @@ TEST_F(RunningRunsTest, AnActWithoutARunIsForTheOnlyOne) {
   const ProgramResult ended = RunPoise({"push", "--run", b, "--force", "-20,0,0"});
   EXPECT_EQ(ended.exit_code, 1) << ended.output;
   EXPECT_THAT(ended.output, HasSubstr("this run has ended"));
+  const ProgramResult reset = RunPoise({"estop", b, "--reset"});
+  EXPECT_EQ(reset.exit_code, 1) << reset.output;
+  EXPECT_THAT(reset.output, HasSubstr("this run has ended"));
   kill(first->pid(), SIGINT);
   first->Wait();
   // What was refused or meant for b has not reached a: its truth knows the last push alone.

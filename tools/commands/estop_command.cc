@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -21,6 +22,9 @@ namespace poise {
 namespace {
 
 constexpr std::chrono::milliseconds kStopPause{2};  // between looks at what bridges say
+constexpr char kEnded[] =
+    "this run has ended, as it does when the robot falls, and a stop ends with it; start one with "
+    "poise run";
 
 /// An operator's line to a running bridge.
 struct Line {
@@ -46,7 +50,13 @@ Line LineTo(const std::filesystem::path& run, OperatorAct::Kind kind) {
   Line line{run, std::make_unique<BusPort>(ReadRunSpec(run.string())), {}};
   const std::string why = line.port->WhyNot(kind);
   if (!why.empty()) throw ConfigError(fmt::format("{}: {}", line.Name(), why));
-  if (kind == OperatorAct::Kind::kReset) line.port->Join();
+  if (kind != OperatorAct::Kind::kReset) return line;
+  try {
+    line.port->Join();
+  } catch (const BusError&) {
+    if (!line.Ended()) throw;
+    throw std::runtime_error(fmt::format("{}: {}", line.Name(), kEnded));
+  }
   return line;
 }
 
@@ -81,8 +91,7 @@ int DoAll(std::vector<Line>& lines, OperatorAct::Kind kind) {
                      : "the stop is reset; the bridge follows commands again");
       continue;
     }
-    fmt::print(stderr, "poise: {}: {}\n", line.Name(),
-               line.Ended() ? "this run has ended" : line.answer->reason);
+    fmt::print(stderr, "poise: {}: {}\n", line.Name(), line.Ended() ? kEnded : line.answer->reason);
     exit_code = kExitFailed;
   }
   return exit_code;
