@@ -119,7 +119,8 @@ void AddRunCommand(CLI::App* app, Command* command) {
   AddWorld(run, &options->changes.world, "the scenario's");
   run->add_option("--seed", options->changes.seed, "of all noise")->check(Whole());
   run->add_option("--drop", options->changes.drop_rate,
-                  "share of the messages that each process drops, to test the recovery")
+                  "share of the messages that each process drops, to test the recovery; each is "
+                  "asked for after 2 ms or more, so that 0.5 makes a tick take 0.1 s and more")
       ->check(Within("in [0, 0.9]", [](double share) { return share >= 0 && share <= 0.9; }));
   run->add_flag(
       "!--no-log", options->launch.log,

@@ -450,7 +450,7 @@ ProcessRunner::Impl::Outcome ProcessRunner::Impl::WaitForInputs(const BoundStage
     }
     if (arrival_ < next_request || StageReady(stage)) continue;
     bus_.Ask(stage, tick_);
-    wait = std::min(2 * wait, kLastRequest);
+    wait = std::min(wait + kFirstRequest, kLastRequest);  // doubled, it added up where half is lost
     next_request = arrival_ + wait;
   }
   return Outcome::kDone;
