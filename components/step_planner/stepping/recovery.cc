@@ -346,8 +346,18 @@ void Recovery::Replan(const StepInput& input, const StepState& state) {
   }
   const double left = step.touch_down - input.time;
   if (!(left > kSwing.freeze)) return;
-  const StepPlan next = walks ? choice_.StrideAt(state, plan_.foot, gait(state), left)
-                              : choice_.At(state, plan_.foot, left, plan_.crossing);
+  StepPlan next = walks ? choice_.StrideAt(state, plan_.foot, gait(state), left)
+                        : choice_.At(state, plan_.foot, left, plan_.crossing);
+  if (walks && swings) {
+    next = OrCaught(state, next, 0, &reason_);
+    if (reason_ == StepReason::kAgain) {
+      step.touch_down = input.time + next.time;
+      step.load = step.touch_down + LoadTime();
+      SetPlan(next);
+      LiftOff(input, foot_.reference(), foot_.rotation().rotation);
+      return;
+    }
+  }
   // A foothold that the way under way does not lead to is none.
   const bool leads = walks || foot_.swing().around() || !next.around;
   if (std::isfinite(next.margin) && leads) SetPlan(next);

@@ -86,7 +86,8 @@ class Recovery {
   void LiftOff(const StepInput& input, const PointMotion& from, const Eigen::Matrix3d& rotation);
   void LiftOff(const StepInput& input);
   /// Until its foot leaves the ground a step that catches a push is chosen anew, place and time.
-  /// Then, as a walk's, its foothold is where the capture point now says.
+  /// Then, as a walk's, its foothold is where the capture point now says. A walk's step in the air
+  /// that misses its place becomes one that catches a push, in the time that this takes.
   void Replan(const StepInput& input, const StepState& state);
   void Land(const StepInput& input);
   /// While the landed foot is loaded. True: the other foot leaves, since the landed one carries
@@ -105,6 +106,9 @@ class Recovery {
   Gait gait(const StepState& state) const;
   /// The step of a walk, or of a recovery where the walk's misses its place.
   StepPlan WalkOn(const StepState& state, Foot foot, double unload, StepReason* reason) const;
+  /// `stride`, or a recovery's step of its foot where that misses its place.
+  StepPlan OrCaught(const StepState& state, const StepPlan& stride, double unload,
+                    StepReason* reason) const;
   /// From rest on both feet the capture point leaves for another place.
   void BeginShift(const StepInput& input, const StepState& state);
   /// From rest: the capture point goes to where the first step begins.

@@ -32,11 +32,15 @@ Gait Recovery::gait(const StepState& state) const {
 
 StepPlan Recovery::WalkOn(const StepState& state, Foot foot, double unload,
                           StepReason* reason) const {
-  StepPlan plan = choice_.Stride(state, foot, gait(state), unload);
+  return OrCaught(state, choice_.Stride(state, foot, gait(state), unload), unload, reason);
+}
+
+StepPlan Recovery::OrCaught(const StepState& state, const StepPlan& stride, double unload,
+                            StepReason* reason) const {
   *reason = StepReason::kWalk;
-  if (std::isfinite(plan.margin) && plan.missed < kMostMissed) return plan;
-  const StepPlan caught = choice_.Next(state, foot, unload);
-  if (!caught.possible || !(caught.margin > plan.margin)) return plan;
+  if (std::isfinite(stride.margin) && stride.missed < kMostMissed) return stride;
+  const StepPlan caught = choice_.Next(state, stride.foot, unload);
+  if (!caught.possible || !(caught.margin > stride.margin)) return stride;
   *reason = StepReason::kAgain;
   return caught;
 }
