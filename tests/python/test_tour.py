@@ -16,11 +16,19 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 MAKER = ROOT.parent / "shared/robots/g1_29dof_tour.xml"
 
 
-def load():
-    spec = importlib.util.spec_from_file_location("tour", ROOT / "examples/tour/tour.py")
-    tour = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(tour)
-    return tour
+def load(name="tour"):
+    sys.path.insert(0, str(ROOT / "examples/tour"))
+    spec = importlib.util.spec_from_file_location(name, ROOT / f"examples/tour/{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def imported(folder):
+    """The maker's robot, brought into `folder`."""
+    subprocess.run([os.environ["POISE_BIN"] + "/poise", "robot", "import", MAKER, "--to", folder + "/g1"],
+                   check=True, capture_output=True)
+    return str(next(pathlib.Path(folder, "g1").glob("*.pbtxt")))
 
 
 class TourTest(unittest.TestCase):
@@ -50,10 +58,7 @@ class TourTest(unittest.TestCase):
         tour = load()
         tour.WAYPOINTS = 2
         with tempfile.TemporaryDirectory() as folder:
-            subprocess.run([os.environ["POISE_BIN"] + "/poise", "robot", "import", MAKER, "--to", folder + "/g1"],
-                           check=True, capture_output=True)
-            robot = next(pathlib.Path(folder, "g1").glob("*.pbtxt"))
-            options = argparse.Namespace(robot=str(robot), world="mujoco", fastest=(0.4, 0.15, 0.6), no_punches=True,
+            options = argparse.Namespace(robot=imported(folder), world="mujoco", fastest=(0.4, 0.15, 0.6), no_punches=True,
                                          arms_held=False)
             runs = [tour.run((seed, options)) for seed in range(4, 8)]
         for seed, (number, lived, whole, errors, work, why) in zip(range(4, 8), runs):
@@ -62,6 +67,20 @@ class TourTest(unittest.TestCase):
             self.assertGreater(work, 0)
         # A run is up to 0.35 m off.
         self.assertLess(np.mean([errors[0][0] for _, _, _, errors, _, _ in runs]), 0.3)
+
+    @unittest.skipUnless(MAKER.exists(), f"the maker's file {MAKER.name} is not beside the repository")
+    def test_a_punch_by_itself_leaves_the_next_one_nothing(self):
+        punches = load("punches")
+        with tempfile.TemporaryDirectory() as folder:
+            options = argparse.Namespace(robot=imported(folder), world="mujoco", punches=8)
+            punches.LEAST, punches.MOST = 0, 80
+            struck = punches.run((3, options))
+        stands = [stands for *_, stands in sorted(struck, key=lambda punch: punch[2])]
+        self.assertTrue(stands[0])
+        self.assertFalse(stands[-1])
+        # Each finds the robot as it was, though the one before has felled it.
+        felled, after = struck[:-1], struck[1:]
+        self.assertTrue(any(next_[3] for before, next_ in zip(felled, after) if not before[3]), struck)
 
 
 if __name__ == "__main__":
