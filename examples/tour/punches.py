@@ -8,7 +8,6 @@ the world is forked for each punch of 20 to 40 N s on a random link.
   python3 examples/tour/punches.py ROBOT.pbtxt --world mujoco --moments 16 --out before.txt
   python3 examples/tour/punches.py ROBOT.pbtxt --world mujoco --moments 16 --against before.txt
 """
-import argparse
 import multiprocessing
 import os
 import pathlib
@@ -21,7 +20,6 @@ import tour
 
 WALKS, STRIKES, WATCHED = 2.0, 4.0, 3.0  # s: it sets off, is struck up to 1 s after, is watched for
 LEAST, MOST = 20, 40  # N s: of the tour's last half minute
-FASTEST = (0.4, 0.15, 0.6)  # m/s ahead, m/s aside, rad/s
 SEED = 7000  # beside the tours'
 GROUPS = "shoulder|elbow|wrist|hip|knee|ankle"
 
@@ -56,7 +54,7 @@ def run(task):
     env.step(1)
     arms = tour.Arms(env, joints, rng)
     # In a quarter of the moments it stands.
-    velocity = rng.uniform(-1, 1, 3) * (np.array(FASTEST) if number % 4 != 3 else 0)
+    velocity = rng.uniform(-1, 1, 3) * (np.array(tour.FASTEST) if number % 4 != 3 else 0)
     struck = STRIKES + rng.uniform()
     names = sorted(joints)
     punches = []
@@ -64,19 +62,19 @@ def run(task):
         direction = rng.normal(size=3)
         punches.append((names[rng.integers(len(names))], rng.uniform(LEAST, MOST),
                         direction / np.linalg.norm(direction)))
-    told = {"arms": WALKS, "walks": False}
+    next_arms = WALKS
 
     def go(until):
+        nonlocal next_arms
         while not env.ended and env.time < until:
-            if env.time >= told["arms"]:
+            if env.time >= next_arms:
                 arms.draw(env.time)
-                told["arms"] += tour.ARM_PERIOD
-            if env.time >= WALKS and not told["walks"]:
-                env.walk(*velocity)
-                told["walks"] = True
+                next_arms += tour.ARM_PERIOD
             arms.drive(env.time)
             env.step(1)
 
+    go(WALKS)
+    env.walk(*velocity)
     go(struck)
     return [(number, name, size, not env.ended and strike(env, go, joints[name][0], size * direction))
             for name, size, direction in punches]
@@ -88,13 +86,9 @@ def group(joint):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("robot", help="text of an imported g1_29dof.xml (poise robot import)")
-    parser.add_argument("--world", choices=("mujoco", "ode"), default="mujoco")
+    parser = tour.arguments(__doc__)
     parser.add_argument("--moments", type=int, default=16)
     parser.add_argument("--punches", type=int, default=24, help="at each moment")
-    parser.add_argument("--first", type=int, default=0, help="number of the first moment, its seed")
-    parser.add_argument("--jobs", type=int, default=multiprocessing.cpu_count())
     parser.add_argument("--out", type=pathlib.Path, help="file of each punch and whether it stood")
     parser.add_argument("--against", type=pathlib.Path, help="such a file of the same punches, to compare with")
     options = parser.parse_args()

@@ -23,6 +23,7 @@ PERIOD = 0.02  # s of a command
 ARM_PERIOD, ARM_STEPS, ARM_STEP = 0.5, 25, 0.06  # s of a target, its random walk, rad
 PUNCH, CEILING, GROWTH = 0.08, 500.0, 60.0  # s, N, s in which the ceiling grows from a third
 RATE = 2 * math.pi * 10  # rad/s of what nobody owns
+FASTEST = (0.4, 0.15, 0.6)  # m/s ahead, m/s aside, rad/s that are commanded at most
 
 
 def joints_of(robot_text):
@@ -154,14 +155,20 @@ def error(truth, goal):
     return np.linalg.norm(way), abs(turn), np.array([c * way[0] + s * way[1], c * way[1] - s * way[0], turn])
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def arguments(description):
+    """What every command of this folder is told."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("robot", help="text of an imported g1_29dof.xml (poise robot import)")
     parser.add_argument("--world", choices=("mujoco", "ode"), default="mujoco")
-    parser.add_argument("--runs", type=int, default=16)
-    parser.add_argument("--first", type=int, default=0, help="number of the first run, its seed")
+    parser.add_argument("--first", type=int, default=0, help="number of the first one, its seed")
     parser.add_argument("--jobs", type=int, default=multiprocessing.cpu_count())
-    parser.add_argument("--fastest", type=float, nargs=3, default=(0.4, 0.15, 0.6),
+    return parser
+
+
+def main():
+    parser = arguments(__doc__)
+    parser.add_argument("--runs", type=int, default=16)
+    parser.add_argument("--fastest", type=float, nargs=3, default=FASTEST,
                         help="m/s ahead, m/s aside, rad/s that are commanded at most")
     parser.add_argument("--no-punches", action="store_true")
     parser.add_argument("--arms-held", action="store_true", help="the arms are the controller's")

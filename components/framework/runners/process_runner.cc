@@ -450,7 +450,8 @@ ProcessRunner::Impl::Outcome ProcessRunner::Impl::WaitForInputs(const BoundStage
     }
     if (arrival_ < next_request || StageReady(stage)) continue;
     bus_.Ask(stage, tick_);
-    wait = std::min(wait + kFirstRequest, kLastRequest);  // doubled, it added up where half is lost
+    // Doubled, the waits of many stages added up where half of the messages is lost.
+    wait = std::min(wait + kFirstRequest, kLastRequest);
     next_request = arrival_ + wait;
   }
   return Outcome::kDone;
